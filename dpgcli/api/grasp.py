@@ -26,7 +26,7 @@ from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.approach import Load, Way
 from dpgcli.grasping.closing import Closing
-from dpgcli.grasping.costs import JOINED_SECONDS, Work, effort, is_moving
+from dpgcli.grasping.costs import JOINED_SECONDS, MOVING_SECONDS, Work, effort, is_moving
 from dpgcli.grasping.joining import n_overlapping
 from dpgcli.grasping.table import BETWEEN, Grasps, columns_of, grasp_rows, grasps
 from dpgcli.mechanics.terms import chain_potential
@@ -311,6 +311,7 @@ def work_of(
         return Work(*sizes, False, n_pairs=n_pairs, effort=effort(scene, None))
     moves, has_friction = is_moving(scene), scene.friction is not None
     work = Work(*sizes, moves, way, n_ramps, has_friction, effort(scene, scene.body))
+    work = replace(work, moving_seconds=MOVING_SECONDS[type(scene.body)])
     if len(pairs) < 2 or moves or closing is not None:
         return work
     n_pairs = n_overlapping(scene, chain_potential, pairs)

@@ -11,12 +11,12 @@ from dpgcli.api.bodies import check_body, force_lines
 from dpgcli.api.grasp import check_drawable
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput, scene_input
 from dpgcli.api.tables import Table, TableResult
-from dpgcli.arrays import Codes, Columns, keep_freed_memory
+from dpgcli.arrays import Array, Codes, Columns, keep_freed_memory
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Held, Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.frames import frames
-from dpgcli.grasping.jaw_table import COLUMNS, PATH_COLUMNS, by_number, jaw_rows, path_rows
+from dpgcli.grasping.jaw_table import COLUMNS, LAST, PATH_COLUMNS, by_number, jaw_rows, path_rows
 from dpgcli.grasping.jaws import JawPath, jaw_path
 from dpgcli.grasping.mechanism import STUDY, Branch, Mechanism
 from dpgcli.mechanics.terms import chain_potential
@@ -65,14 +65,28 @@ class JawsResult(TableResult):
         return tuple(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        n_lost = int((self.rows["status"] != Status.STABLE).sum())
-        for number, n, least, most in by_number(self.rows):
-            held = f"{least:.4g} N" if n == 1 else f"{least:.4g} to {most:.4g} N"
-            yield f"F{number}, {counted(number, 'unit')} inverted: {held} ({counted(n, 'state')})"
-        if n_lost:
-            yield f"{counted(n_lost, 'state')} without an answer: see the column status"
+        for number, exactly, at_least in by_number(self.rows):
+            held = [_held("", exactly), _held("at least ", at_least)]
+            said = ", ".join(text for text in held if text)
+            yield f"F{number}, {counted(number, 'unit')} inverted: {said}"
+        yield from self._ways()
         yield from self._mechanism()
         yield from force_lines(self.given.scene)
+
+    def _ways(self) -> Iterator[str]:
+        """How many states have no answer, or only a part of one."""
+        n_without = int((self.rows["status"] != Status.STABLE).sum())
+        n_kept = int((self.rows["ended_by"] == LAST).sum())
+        n_lost = int((~np.isnan(self.rows["lost_mm"])).sum())
+        if n_kept:
+            yield f"{counted(n_kept, 'state')} without a reset up to {self.gaps[1]:g} mm"
+        if n_lost:
+            yield (
+                f"{counted(n_lost, 'state')} lost on the way: no certified state from lost_mm on, "
+                "see the column ended_by"
+            )
+        if n_without:
+            yield f"{counted(n_without, 'state')} without an answer: see the column status"
 
     def _mechanism(self) -> Iterator[str]:
         """The study's two forces: one fitted, the other predicted, if both states are there."""
@@ -126,6 +140,14 @@ class JawsResult(TableResult):
 
         check_drawable(len(self.path.codes))
         draw_jaws(self.given.scene, self.path, self.rows, figure_path(path))
+
+
+def _held(prefix: str, force: Array) -> str:
+    """Such as "at least 0.2 to 0.3 N (2 states)"; nothing of no states."""
+    if not len(force):
+        return ""
+    ends = dict.fromkeys(f"{value:.4g}" for value in (force.min(), force.max()))
+    return f"{prefix}{' to '.join(ends)} N ({counted(len(force), 'state')})"
 
 
 def jaws(

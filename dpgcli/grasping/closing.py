@@ -13,7 +13,7 @@ from dpgcli.design.pressure import History, Pressure
 from dpgcli.grasping.approach import Approach, Reset, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
-from dpgcli.grasping.shapes import ContactShapes, Ramp
+from dpgcli.grasping.shapes import Ramp
 from dpgcli.grasping.travels import with_travels, without_travels
 from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.records import dataclass

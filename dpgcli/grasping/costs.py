@@ -16,7 +16,7 @@ RAMP_SECONDS = 3e-4  # of a state of a routine, each time that pressures change
 STEP_SECONDS = 0.015  # of pressures that close fingers, however many states and units
 CLOSING_SECONDS = 0.5  # of what happens on their way, likewise
 CLOSED_SECONDS, CHANGE_SECONDS = 5e-3, 2.4e-5  # of a state, and at each step, times the units
-MOVING_SECONDS = 3e-3  # of a row whose body is let go of
+MOVING_SECONDS = {Disc: 3e-3, Jaws: 1.4e-2, Polygon: 3e-3}  # of a row whose body is let go of
 PULLED_SECONDS = 6e-4  # of a row whose body is pulled on
 PAIR_SECONDS = 3.5e-3  # of two fingers in different states that come together
 JOINED_SECONDS = 2e-2  # of two that touch a body as well, with their margins
@@ -50,6 +50,7 @@ class Work:
     effort: float = 1.0  # times that of a disc and the published law
     n_pairs: int = 0
     pair_seconds: float = PAIR_SECONDS  # times the square of the number of units
+    moving_seconds: float = MOVING_SECONDS[Disc]  # likewise
 
     @property
     def seconds(self) -> float:
@@ -60,7 +61,7 @@ class Work:
         """
         square = self.n_units**2
         steps = self.n_ramps * STEP_SECONDS
-        let_go = self.n_rows * MOVING_SECONDS * square if self.is_moving else 0.0
+        let_go = self.n_rows * self.moving_seconds * square if self.is_moving else 0.0
         pulled = self.n_rows * PULLED_SECONDS * square if self.has_friction else 0.0
         met = self._placed + let_go + pulled + self.n_pairs * self.pair_seconds * square
         return START_SECONDS + steps + self.effort * met + self.n_rows * ROW_SECONDS
@@ -106,7 +107,7 @@ def design_seconds(scene: Scene) -> float:
     """Seconds of one core for a state of a design with the scene's body, by its units squared."""
     assert scene.body is not None, "a scene with a body"
     n_fingers = 1 if scene.gripper is None or bool(np.all(scene.body.is_mirrored)) else 2
-    let_go = MOVING_SECONDS if is_moving(scene) else 0.0
+    let_go = MOVING_SECONDS[type(scene.body)] if is_moving(scene) else 0.0
     pulled = PULLED_SECONDS if scene.friction is not None else 0.0
     placed = n_fingers * STATE_SECONDS[Way.PLACE]
     return effort(scene, scene.body) * (WITHOUT_MARGINS * (placed + let_go) + pulled)

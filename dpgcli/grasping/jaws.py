@@ -3,7 +3,8 @@
 Each plate moves half of the way, along y. The fingers meet the jaws at the first aperture, where
 these grow from nothing as any body; then the aperture goes to the last one and back. What it takes
 to keep the jaws apart is a multiplier: the squeeze of the fingers, to the last digit, and its
-slope by the aperture is that of the path.
+slope by the aperture is that of the path. Every rest that is told is certified: a way ends where
+there is none.
 """
 
 from collections.abc import Iterator
@@ -21,14 +22,15 @@ from dpgcli.grasping.approach import Approach, approach
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.frames import FingerFrame
-from dpgcli.grasping.grasp import described, placed
-from dpgcli.grasping.shapes import ContactShapes, Motion
+from dpgcli.grasping.grasp import described, judged, placed
+from dpgcli.grasping.shapes import ContactShapes, Motion, with_lost
 from dpgcli.mechanics.terms import Formulate
 from dpgcli.records import dataclass
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import codes_of
 
 STEPS = 50  # of the aperture, each way
+NOTHING = 1e-11  # of the forces in play: a smaller squeeze is none
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class JawPath:
     """What fingers, (lane,), bear as jaws open and close through apertures `gap`, (step,), mm.
 
     `squeeze` N and `stiffness` N/mm, (step, lane), are those of two such fingers, `code` is the
-    state there; NaN from where no rest was found. `status` (lane,) is that at the beginning.
+    state there and `status` the result of its certification; NaN from where it is not stable.
     """
 
     codes: Codes
@@ -71,30 +73,35 @@ def jaw_path(
     gaps: tuple[float, float],
     n_steps: int = STEPS,
 ) -> JawPath:
-    """Fingers in these states at jaws that go from the first aperture to the last, and back."""
+    """Fingers in these states at jaws that go from the first aperture to the last, and back.
+
+    A lane ends at the first aperture without a certified rest.
+    """
     begun = placed(scene, formulate, replace(jaws, gap=gaps[0]), frame, codes)
     shapes = begun.grown.shapes
     (finger,) = described(begun.own, [codes], begun.grown, begun.status, with_margins=False)
     is_other = (finger.status == Status.STABLE) & (finger.after != codes)
     status = np.where(is_other, np.uint8(Status.ANOTHER_PATTERN), finger.status)
-    is_stable = np.asarray(status == Status.STABLE)
-    shapes = replace(shapes, is_there=shapes.is_there & is_stable)
+    shapes = replace(shapes, is_there=shapes.is_there & (status == Status.STABLE))
     share, halts = np.arange(n_steps + 1) / n_steps, list[Halt]()
-    told: list[tuple[float, Array, Array, Codes]] = []
+    told: list[tuple[float, Array, Array, Codes, NDArray[np.uint8]]] = []
     for begin, end in (gaps, gaps[::-1]):
         own = _with_jaws(begun.own, jaws, frame, begin, end)
         shapes = _with_motion(own, shapes)
+        status = with_lost(status, shapes.is_there)
         if not told:
-            told.append((begin, *_told(own, shapes, 0.0, end - begin)))
+            told.append((begin, *_told(own, shapes, 0.0, end - begin), status))
         for before, load in pairwise(share):
             at = np.full(len(codes), before)
-            came = approach(own, shapes, at, np.full(len(codes), load))
+            came = approach(own, shapes, at, np.full(len(codes), load), unfolded=True)
             halts += _halts(came, len(told), begin, end)
-            shapes = came.shapes
-            told.append((begin + load * (end - begin), *_told(own, shapes, load, end - begin)))
+            status = with_lost(judged(own, came, status)[2], came.shapes.is_there)
+            shapes = replace(came.shapes, is_there=status == Status.STABLE)
+            gap = begin + load * (end - begin)
+            told.append((gap, *_told(own, shapes, load, end - begin), status))
         shapes = own.at_rest(shapes)
-    gap, squeeze, stiffness, code = (np.array(values) for values in zip(*told, strict=True))
-    return JawPath(codes, gap, squeeze, stiffness, code, status, tuple(halts))
+    gaps_told, *others = (np.array(values) for values in zip(*told, strict=True))
+    return JawPath(codes, gaps_told, *others, tuple(halts))
 
 
 def _with_jaws(
@@ -137,6 +144,8 @@ def _told(
     there = corrected(family, own.stacked(here), np.full(n, load), nothing, free, depth)
     slopes = own.pushes(here.active, there.along_load[len(here.coordinates) :])
     slope = slopes[-1] / travel
-    squeeze = np.where(shapes.is_there, shapes.push[-1], np.nan)
+    least = NOTHING * own.units.finger.force_scale.min()
+    push = np.where(np.abs(shapes.push[-1]) > least, shapes.push[-1], 0.0)
+    squeeze = np.where(shapes.is_there, push, np.nan)
     stiffness = np.where(shapes.is_there, slope, np.nan)
     return 2.0 * squeeze, 2.0 * stiffness, codes_of(own.is_open(shapes))

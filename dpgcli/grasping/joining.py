@@ -42,7 +42,7 @@ from dpgcli.states.patterns import inverted_units
 from dpgcli.states.settle import settle
 from dpgcli.states.units import UnitSolutions
 
-OVERLAP = 1e-9  # mm: what is less is a touch
+OVERLAP = 3e-10  # of a stroke: what is less is a touch
 ROWS = 2**12  # that are looked at at once
 
 
@@ -143,7 +143,9 @@ def _overlap(
     0 where they do not overlap, or are not at rest. Rows that are alike are mirrored pairs.
     """
     nodes = [_ended(part) for part in parts]
-    travel = np.zeros(len(is_alike))
+    travel, stroke = np.zeros(len(is_alike)), parts[0].own.large[0]
+    if len(stroke) > 1:
+        stroke = stroke[lanes[0]]
     for first in range(0, len(travel), ROWS):
         rows = np.arange(first, min(first + ROWS, len(travel)))
         own = axis.take_lanes(rows)
@@ -153,7 +155,7 @@ def _overlap(
         beyond = -2.0 * upper[1].min(axis=0)
         travel[rows] = np.where(is_alike[rows], beyond, way_of(upper, lower))
     each = [part.status[index] == Status.STABLE for part, index in zip(parts, lanes, strict=True)]
-    return np.where(np.all(each, axis=0) & (travel > OVERLAP), travel, 0.0)
+    return np.where(np.all(each, axis=0) & (travel > OVERLAP * stroke), travel, 0.0)
 
 
 def n_overlapping(scene: Scene, formulate: Formulate, pairs: Sequence[Codes]) -> int:
@@ -170,7 +172,8 @@ def n_overlapping(scene: Scene, formulate: Formulate, pairs: Sequence[Codes]) ->
     lowest = frames(scene.gripper)[0].axis.height(nodes).min(axis=0)
     upper, lower = (lowest[np.searchsorted(needed, codes)] for codes in pairs)
     is_alike = (pairs[0] == pairs[1]) & bool(scene.body.is_mirrored)
-    return int(((upper + lower < -OVERLAP) & ~is_alike).sum())
+    least = OVERLAP * scene.finger.stroke.min()
+    return int(((upper + lower < -least) & ~is_alike).sum())
 
 
 def _ended(part: Placed) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 
 from dpgcli.arrays import Columns
 from dpgcli.design.scene import Scene
+from dpgcli.grasping.jaw_table import is_exact
 from dpgcli.grasping.jaws import JawPath
 from dpgcli.grasping.mechanism import STUDY
 from dpgcli.reports.drawing import figure_to
@@ -61,14 +62,20 @@ def _draw_curves(axes: Any, path: JawPath, rows: Columns, n_units: int) -> None:
 
 
 def _draw_numbers(axes: Any, rows: Columns, n_units: int) -> None:
-    largest = rows["largest_squeeze_N"]
+    largest, exact = rows["largest_squeeze_N"], is_exact(rows)
     for lane, number in enumerate(rows["n_inverted"]):
         color = _color(int(number), n_units)
-        axes.plot(number, largest[lane], "o", color=color, ms=5, mec="black", mew=0.4)
+        told = "o" if exact[lane] else "^"
+        axes.plot(number, largest[lane], told, color=color, ms=5, mec="black", mew=0.4)
+    if not exact[~np.isnan(largest)].all():
+        axes.plot(
+            [], [], "^", color="0.6", mec="black", mew=0.4, label="at least: no unit has reset"
+        )
     measured = [(text.count("1"), force) for text, force in STUDY.items() if len(text) == n_units]
     if measured:
         label = "measured in the study\n(a mechanism of unknown sizes)"
         axes.plot(*zip(*measured, strict=True), "D", mfc="none", mec=STUDY_COLOR, label=label)
+    if axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=7.0, frameon=False)
     axes.set_xticks(np.arange(n_units + 1))
     axes.set_xlim(-0.5, n_units + 0.5)
@@ -82,4 +89,5 @@ def _described(rows: Columns, lane: int) -> str:
     force, gap = rows["largest_squeeze_N"][lane], rows["largest_at_mm"][lane]
     if np.isnan(force):
         return f"{rows['pattern'][lane]}: no force"
-    return f"{rows['pattern'][lane]}: at most {force:.4g} N, at {gap:.4g} mm"
+    bound = "at most" if is_exact(rows)[lane] else "at least"
+    return f"{rows['pattern'][lane]}: {bound} {force:.4g} N, at {gap:.4g} mm"

@@ -105,6 +105,8 @@ def test_work_knows_bodies_and_laws() -> None:
     times = [work_of(own, pairs).seconds for own in (disc, jaws, wedge, soft)]
     assert times == sorted(times) and times[-1] > 10.0 * times[0]
     assert not is_moving(jaws) and is_moving(soft)
+    let_go = replace(disc, held=Held.FREE)
+    assert design_seconds(soft) > 5.0 * design_seconds(let_go), "36 s beside 5 s"
     curved = scene_input(CONFIGS / "gripper_and_can.yaml").scene
     published = scene_input(
         CONFIGS / "gripper_and_can.yaml", ["finger.calibration=published"]

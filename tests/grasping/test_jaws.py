@@ -12,6 +12,7 @@ from scipy.optimize import root
 from dpgcli.arrays import Array
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Gripper, Scene
+from dpgcli.grasping import jaws
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.jaw_table import by_number, jaw_rows, path_rows
@@ -31,13 +32,20 @@ SPACING, THICKNESS = 30.0, 1.5  # mm
 
 
 def on_jaws(
-    finger: Finger, gaps: tuple[float, float], at: float, *patterns: str, n_steps: int = 8
+    finger: Finger,
+    gaps: tuple[float, float],
+    at: float,
+    *patterns: str,
+    n_steps: int = 8,
+    height: float = 20.0,
+    scale: float = 1.0,
 ) -> JawPath:
-    scene = Scene(finger, (), Gripper(base_spacing=SPACING, mounting_angle=0.0), THICKNESS)
+    gripper = Gripper(base_spacing=scale * SPACING, mounting_angle=0.0)
+    scene = Scene(finger, (), gripper, scale * THICKNESS)
     codes = codes_of(np.array([[digit == "1" for digit in text] for text in patterns]).T)
-    jaws = Jaws(np.array([at, 0.0]), gaps[1], 20.0)
+    body = Jaws(np.array([at, 0.0]), gaps[1], scale * height)
     upper = frames(scene.gripper)[0]
-    return jaw_path(scene, chain_potential, jaws, upper, codes, gaps, n_steps)
+    return jaw_path(scene, chain_potential, body, upper, codes, gaps, n_steps)
 
 
 @pytest.mark.parametrize(("pattern", "first"), [("01", 25.0), ("11", 15.0)])
@@ -47,7 +55,7 @@ def test_stiffness_is_the_slope_of_the_squeeze(
 ) -> None:
     """By Hermite's cubic of every second step, at the steps between."""
     path = on_jaws(reference_finger(2, bars), (first, first + 1.0), 20.0, pattern)
-    assert path.status.tolist() == [Status.STABLE] and not path.halts
+    assert (path.status == Status.STABLE).all() and not path.halts
     gap, squeeze = path.gap[:9], path.squeeze[:9, 0]
     assert (squeeze > 0.01).all(), "N: it is pressed everywhere"
     cubic = CubicHermiteSpline(gap[::2], squeeze[::2], path.stiffness[:9:2, 0])
@@ -62,7 +70,7 @@ def test_the_end_of_a_face_on_a_plate(
     """∇E = N ∇y with y that of the face's last node, by an energy of its own and SciPy's root."""
     finger = reference_finger(2, bars)
     path = on_jaws(finger, (15.0, 16.0), 20.0, "11", n_steps=4)
-    assert path.status.tolist() == [Status.STABLE]
+    assert (path.status == Status.STABLE).all()
     tool = own(finger, np.ones(2, bool), THICKNESS, (0.0, 0.0), 1.0)
 
     def end(q: Array) -> Array:
@@ -101,7 +109,81 @@ def test_states_that_are_others_at_the_beginning_say_so(reference_finger: Finger
     path = on_jaws(reference_finger(2), (29.0, 30.0), 20.0, "11", "00", n_steps=2)
     rows = jaw_rows(path, 2)
     assert rows["status"][0] == Status.ANOTHER_PATTERN and np.isnan(rows["largest_squeeze_N"][0])
-    assert [number for number, *_ in by_number(rows)] in ([], [0])
+    assert [borne.n_inverted for borne in by_number(rows)] in ([], [0])
+
+
+def test_a_way_ends_where_a_finger_has_folded(reference_finger: Fingers) -> None:
+    """The shape is an equilibrium with a positive curvature: only its corners tell."""
+    path = on_jaws(reference_finger(2), (30.0, 70.0), 15.0, "00", height=10.0)
+    assert path.status[:7, 0].tolist() == [Status.STABLE] * 7
+    assert (path.status[7:, 0] == Status.FOLDED).all(), "and does not come back"
+    assert np.isnan(path.squeeze[7:]).all() and not np.isnan(path.squeeze[:7]).any()
+    rows = jaw_rows(path, 2)
+    assert rows["ended_by"].tolist() == ["folded"] and rows["lost_mm"][0] == path.gap[7]
+    (borne,) = by_number(rows)
+    assert borne.at_least.tolist() == [np.nanmax(path.squeeze)] and not len(borne.exactly)
+
+
+@pytest.mark.parametrize(
+    ("reason", "word"), [(Status.MARGINAL, "marginal"), (Status.NOT_CONVERGED, "not_converged")]
+)
+def test_every_aperture_is_certified(
+    reason: Status, word: str, monkeypatch: pytest.MonkeyPatch, reference_finger: Fingers
+) -> None:
+    """What certification finds at one of them ends the way."""
+    found = jaws.judged
+
+    def wrong(own: Any, came: Any, status: Any) -> Any:
+        there, settled, known = found(own, came, status)
+        return there, settled, np.where(came.load == 0.5, np.uint8(reason), known)
+
+    monkeypatch.setattr(jaws, "judged", wrong)
+    path = on_jaws(reference_finger(2), (15.0, 16.0), 20.0, "11", n_steps=4)
+    rows = jaw_rows(path, 2)
+    assert path.status[:, 0].tolist() == [Status.STABLE] * 2 + [reason] * 7
+    assert rows["ended_by"].tolist() == [word] and rows["lost_mm"].tolist() == [15.5]
+    assert rows["status"].tolist() == [Status.STABLE], "at the first aperture"
+    assert rows["largest_at_mm"].tolist() == [15.25]
+
+
+def test_searches_that_are_lost_say_where(reference_finger: Fingers) -> None:
+    """Jaws that come up behind the end of a finger: it has no front that they could meet."""
+    path = on_jaws(reference_finger(2), (10.0, 40.0), 32.0, "00", "10", height=8.0)
+    rows = jaw_rows(path, 2)
+    assert rows["ended_by"].tolist() == ["last_aperture", "not_converged"]
+    assert np.isnan(rows["touch_mm"]).all() and np.isnan(rows["largest_squeeze_N"]).all()
+    assert rows["lost_mm"].tolist() == pytest.approx([np.nan, 32.5], nan_ok=True)
+    assert path_rows(path, 2)["pattern_now"][17:].tolist() == ["10"] * 6 + [""] * 11
+
+
+def test_what_is_lost_after_a_reset_is_told_beside_it(reference_finger: Fingers) -> None:
+    path = on_jaws(reference_finger(2), (26.0, 60.0), 14.0, "00", "10")
+    rows = jaw_rows(path, 2)
+    assert rows["ended_by"].tolist() == ["not_converged", "reset"]
+    assert (rows["lost_mm"] == 55.75).all()
+    least, exact = by_number(rows)
+    assert len(least.at_least) == 1 and not len(least.exactly)
+    assert exact.exactly.tolist() == [rows["largest_squeeze_N"][1]] and not len(exact.at_least)
+
+
+def test_a_touch_is_where_it_is_in_a_world_of_any_size(reference_finger: Fingers) -> None:
+    """Lengths a ten-thousandth, elastic moduli the same: forces to the power of two."""
+    large, small = (
+        scaled_path(reference_finger(2), scale, (15.0, 25.0), 20.0, "01") for scale in (1.0, 1e-4)
+    )
+    one, other = (jaw_rows(path, 2) for path in (large, small))
+    assert one["touch_mm"][0] > 15.0 and other["touch_mm"] == pytest.approx(1e-4 * one["touch_mm"])
+    assert other["largest_squeeze_N"] == pytest.approx(1e-8 * one["largest_squeeze_N"])
+
+
+def scaled_path(
+    finger: Finger, scale: float, gaps: tuple[float, float], at: float, *patterns: str
+) -> JawPath:
+    lengths = "segment_length", "segment_height", "stroke", "bistable_stiffness"
+    values = {name: scale * getattr(finger, name) for name in lengths}
+    values["hinge_stiffness"] = scale**3 * finger.hinge_stiffness
+    first, last = (scale * gap for gap in gaps)
+    return on_jaws(finger.changed(**values), (first, last), scale * at, *patterns, scale=scale)
 
 
 def test_rows_of_a_path(reference_finger: Fingers) -> None:
