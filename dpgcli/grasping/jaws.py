@@ -100,8 +100,8 @@ def jaw_path(
             gap = begin + load * (end - begin)
             told.append((gap, *_told(own, shapes, load, end - begin), status))
         shapes = own.at_rest(shapes)
-    gaps_told, *others = (np.array(values) for values in zip(*told, strict=True))
-    return JawPath(codes, gaps_told, *others, tuple(halts))
+    way, squeeze, stiffness, code, found = (np.array(values) for values in zip(*told, strict=True))
+    return JawPath(codes, way, squeeze, stiffness, code, found, tuple(halts))
 
 
 def _with_jaws(

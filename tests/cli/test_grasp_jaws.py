@@ -21,12 +21,25 @@ def test_rows_files_and_a_summary(call: Any, folder: Path) -> None:
     assert lines[0].split()[:4] == ["pattern", "status", "n_inverted", "touch_mm"]
     assert [line.split()[0] for line in lines[1:]] == ["01000", "10000"]
     assert lines[2].endswith("1 at 38.58 mm")
-    assert "F1, 1 unit inverted: 0.2998 to 0.363 N (2 states)" in result.stderr
+    assert "F1, 1 unit inverted: 0.363 N (1 state), at least 0.2998 N (1 state)" in result.stderr
+    assert "1 state without a reset up to 40 mm" in result.stderr
     assert "forces: published" in result.stderr
     table = pq.read_table(folder / "j.parquet")
     assert table.num_rows == 2 * 101
     assert table.column_names[:3] == ["pattern", "step", "jaw_gap_mm"]
     assert "aperture of the jaws" in (folder / "j.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_states_that_are_lost_are_counted(call: Any) -> None:
+    """Nothing is said to bear what only a part of the way was looked at for."""
+    options = ("--jaws", "55:100", "--at", "30,0", "--pattern", "00000")
+    result = call("grasp", GRIPPER, *options)
+    assert result.exit_code == ExitCode.DONE
+    header, row = (line.split() for line in result.stdout.splitlines())
+    assert row[header.index("ended_by")] == "folded" and row[header.index("lost_mm")] == "94.60000"
+    assert "F0, 0 units inverted: at least 7.671 N (1 state)" in result.stderr
+    assert "1 state lost on the way: no certified state from lost_mm on" in result.stderr
 
 
 @pytest.mark.parametrize(

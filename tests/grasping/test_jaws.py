@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import root
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Flags
 from dpgcli.design.bodies import Jaws
 from dpgcli.design.scene import Gripper, Scene
 from dpgcli.grasping import jaws
@@ -146,6 +146,19 @@ def test_every_aperture_is_certified(
     assert rows["largest_at_mm"].tolist() == [15.25]
 
 
+def test_no_reset_is_told_of_a_folded_finger(
+    monkeypatch: pytest.MonkeyPatch, reference_finger: Fingers
+) -> None:
+    """Between two apertures as well, where certification does not look."""
+
+    def folded(own: Obstructed, shapes: ContactShapes) -> Flags:
+        return np.ones(shapes.coordinates.shape[1], bool)
+
+    monkeypatch.setattr(Obstructed, "are_folded", folded)
+    path = on_jaws(reference_finger(2), (16.0, 26.0), 20.0, "11", n_steps=2)
+    assert not path.halts and path.status[1:].tolist() == [[Status.NOT_CONVERGED]] * 4
+
+
 def test_searches_that_are_lost_say_where(reference_finger: Fingers) -> None:
     """Jaws that come up behind the end of a finger: it has no front that they could meet."""
     path = on_jaws(reference_finger(2), (10.0, 40.0), 32.0, "00", "10", height=8.0)
@@ -156,6 +169,7 @@ def test_searches_that_are_lost_say_where(reference_finger: Fingers) -> None:
     assert path_rows(path, 2)["pattern_now"][17:].tolist() == ["10"] * 6 + [""] * 11
 
 
+@pytest.mark.slow
 def test_what_is_lost_after_a_reset_is_told_beside_it(reference_finger: Fingers) -> None:
     path = on_jaws(reference_finger(2), (26.0, 60.0), 14.0, "00", "10")
     rows = jaw_rows(path, 2)

@@ -20,7 +20,7 @@ from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.frames import frames
 from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.table import BETWEEN, Grasps, columns_of, grasp_rows, grasps
-from dpgcli.mechanics.finger import STUDY, Finger
+from dpgcli.mechanics.finger import STUDY, Finger, uniform_finger
 from dpgcli.mechanics.laws import PUBLISHED, PushOnly
 from dpgcli.mechanics.pressure import DomeVolumes
 from dpgcli.mechanics.terms import chain_potential
@@ -581,3 +581,17 @@ def test_payloads_beside_other_fingers(reference_finger: Fingers) -> None:
     assert (rows["between_fingers_N"] > 0.0).all()
     assert np.isnan(rows["payload_N"]).tolist() == [True, False] and rows["payload_N"][1] > 0.0
     assert rows["fails_first"].tolist()[0] == "" and rows["fails_first"][1] in {"slip", "reset"}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-10])
+def test_overlaps_are_counted_in_a_world_of_any_size(scale: float) -> None:
+    """All lengths a share, with the same moduli: fingers overlap as they did."""
+    values: dict[str, Any] = {name: scale * value for name, value in STUDY.items()}
+    values["force_linearity"] = STUDY["force_linearity"]
+    values["hinge_stiffness"] = scale**3 * STUDY["hinge_stiffness"]
+    finger = uniform_finger(2, **values)
+    gripper = Gripper(base_spacing=8.0 * scale, mounting_angle=0.0)
+    disc = Disc(np.array([100.0, 0.0]) * scale, scale)
+    scene = Scene(finger, (), gripper, scale * THICKNESS, body=disc)
+    pairs = codes("11", "00"), codes("01", "01")
+    assert joining.n_overlapping(scene, chain_potential, pairs) == 1

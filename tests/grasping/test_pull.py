@@ -10,13 +10,16 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import root
 
-from dpgcli.arrays import Array
+from dpgcli.arrays import Array, Flags
 from dpgcli.design.bodies import Body, Disc, Friction, Jaws
 from dpgcli.design.scene import Gripper, Scene
+from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.release import opened_by
+from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.grasping.table import grasp_rows, grasps
 from dpgcli.mechanics.finger import STUDY, uniform_finger
 from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.certify import Status
 
 CENTER, RADIUS, SPACING, THICKNESS = np.array([24.0, 0.0]), 11.0, 30.0, 1.5
 GRIPPER = Gripper(base_spacing=SPACING, mounting_angle=0.0)
@@ -179,6 +182,20 @@ def test_a_unit_resets_at_the_fold_of_a_finger_by_itself(own: Any) -> None:
     rows = rows_of(scene())
     assert (rows["fails_first"][0], rows["touching"][0]) == ("reset", "2")
     assert rows["payload_N"][0] == pytest.approx(Half(own).fold_at(BEGIN), rel=1e-7)
+
+
+def test_what_is_folded_where_a_unit_resets_bears_nothing_that_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A shape that no finger can take ends the way, and nothing else does."""
+
+    def folded(own: Obstructed, shapes: ContactShapes) -> Flags:
+        return np.ones(shapes.coordinates.shape[1], bool)
+
+    monkeypatch.setattr(Obstructed, "are_folded", folded)
+    rows = rows_of(scene())
+    assert rows["status"].tolist() == [Status.STABLE]
+    assert np.isnan(rows["payload_N"]).all() and rows["fails_first"].tolist() == [""]
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.6, 1.0])
