@@ -163,7 +163,7 @@ def test_states_of_a_finger_are_data_to_compare_with(call: Any, folder: Path, fa
     chambers = HingeChambers(9.0, 20.0, 0.75, 3.0, 1.5, 26.0)
     nodes = pushed_bricks(chambers, PUSHED_CELLS["coarse"], 4).nodes
     x, y, _ = nodes.T
-    turned = np.stack([3.45 + 0.05 * y, -0.5 - 0.05 * (x - 52.0), 0.0 * x], axis=1)  # at the tip
+    turned = np.stack([3.45 + 0.002 * y, -0.5 - 0.002 * (x - 52.0), 0.0 * x], axis=1)  # at the tip
     write_displacements(folder / "prepared.dat", np.where(nodes[:, :1] > 39.0, turned, 0.0))
     fake('cp ../../prepared.dat "$1.dat"')
     assert call(*FINGER, "--pattern", "00?", "--run").exit_code == ExitCode.DONE
