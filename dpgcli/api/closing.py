@@ -3,11 +3,15 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from dpgcli.actuation.graph import rests
+from dpgcli.actuation.pressed import Pressed
 from dpgcli.api.histories import PressureInput, history_input
 from dpgcli.api.inputs import SceneInput, Settings, SpecInput
 from dpgcli.api.pressure import pressed_input
+from dpgcli.design.scene import Scene
 from dpgcli.errors import Field, UsageError
 from dpgcli.grasping.closing import Closing
+from dpgcli.states.units import UnitSolutions
 
 
 def closing_input(
@@ -42,3 +46,10 @@ def closing_input(
     given = replace(given, files=(*given.files, *history.files))
     volumes = pressed.pressed.volumes
     return given, Closing(volumes, pressed.pressure, history.history)
+
+
+def rest_of(scene: Scene, closing: Closing) -> str:
+    """The pattern in which fingers rest before any pressure, 0…0 where that is not known."""
+    pressed = Pressed(UnitSolutions.of(scene.finger), closing.volumes)
+    (code,), (is_certain,) = rests(pressed, 1)
+    return f"{int(code) if is_certain else 0:0{scene.finger.n_units}b}"

@@ -241,7 +241,7 @@ def grasp(
     way = chosen(Way, "approach", approach)
     given, closing = grasp_input(spec, object, at, settings, way, pressure)
     said = None if patterns is None else as_texts("patterns", patterns)
-    return grasp_of(given, patterns_of(given.scene, way, said), both, way, closing)
+    return grasp_of(given, patterns_of(given.scene, closing, said), both, way, closing)
 
 
 def grasp_input(
@@ -275,11 +275,17 @@ def grasp_input(
     return completed(scene_input(spec, of_spec)), None
 
 
-def patterns_of(scene: Scene, way: Way, patterns: Sequence[str] | None) -> tuple[str, ...]:
-    """Patterns as given, else all of them; fingers that close are at rest before."""
+def patterns_of(
+    scene: Scene, closing: Closing | None, patterns: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Patterns as given, else all of them, or that in which fingers rest before they close."""
     if patterns is not None:
         return tuple(patterns)
-    return ("0" * scene.finger.n_units if way is Way.CLOSE else "*",)
+    if closing is None:
+        return ("*",)
+    from dpgcli.api.closing import rest_of
+
+    return (rest_of(scene, closing),)
 
 
 def grasp_of(

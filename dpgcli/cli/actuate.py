@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dpgcli.api.actuate import ActuateResult
 
 Start = Annotated[
-    str, typer.Option("--from", metavar="PATTERN", help="Pattern to start from  [default: 0...0]")
+    str, typer.Option("--from", metavar="PATTERN", help="Pattern to start from  [default: at rest]")
 ]
 Cycles = Annotated[
     int, typer.Option("--cycles", metavar="N", help="Repeat the history, and report the drift")

@@ -114,7 +114,7 @@ def grasp(
         _open_jaws(given, jaws, place, patterns, printed_as, output, plot, quiet)
         return
     given, closing = grasp_input(spec, body, place, settings or (), way, pressure)
-    chosen = patterns_of(given.scene, way, patterns or None)
+    chosen = patterns_of(given.scene, closing, patterns or None)
     pairs = pairs_of(chosen, given.scene, both)
     if plot is not None:
         check_drawable(len(pairs[0]))

@@ -13,7 +13,7 @@ from dpgcli.cli.streams import say
 
 To = Annotated[str, typer.Option("--to", metavar="PATTERN", help="Pattern to reach")]
 Start = Annotated[
-    str, typer.Option("--from", metavar="PATTERN", help="Pattern to start from  [default: 0...0]")
+    str, typer.Option("--from", metavar="PATTERN", help="Pattern to start from  [default: at rest]")
 ]
 Lookup = Annotated[
     bool, typer.Option("--table", help="What pulses of all sizes do to the state, instead")

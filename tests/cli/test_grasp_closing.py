@@ -55,6 +55,19 @@ def test_rows_say_what_snapped_at_which_pressure(call: Any, folder: Path, spec: 
     assert found.table["events"].tolist() == [row["events"]]
 
 
+def test_fingers_close_from_where_loads_leave_them(call: Any, folder: Path, spec: str) -> None:
+    """As `actuate` and `routine` do: this couple flips the softest unit before any pressure."""
+    lattice = "finger.overrides.{}.lattice.bistable_stiffness_N_per_mm={}"
+    graded = ("--set", lattice.format(2, 16), "--set", lattice.format(3, 18))
+    loaded = (*graded, "--set", "loads.tip_moment_N_mm=-52")
+    far = ("--object", "disc:10", "--at", "30,0", "--set", "gripper.base_spacing_mm=90")
+    result = call(
+        "grasp", spec, *far, *CLOSE, *loaded, "--pressure", "0:0.01:0", "--format", "json"
+    )
+    (row,) = json.loads(result.stdout)
+    assert (row["pattern"], row["status"]) == ("100", "stable")
+
+
 def test_lines_are_named_and_histories_are_those_of_actuate(
     call: Any, folder: Path, spec: str
 ) -> None:
