@@ -17,6 +17,7 @@ from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, al
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap: what is left to go
+ROUGH_STEP = 1e-3  # of the step cap: the last one to points that are rough; Newton squares it
 CROSSED = 1e-11  # of what margins are measured by: as near Newton comes to an event
 STRAYING, SHRINKING = 0.05, 0.25  # of the step cap; of a step: what guesses are good for
 ASTRAY, GROWING = 1e-2, 0.8  # of the step cap: longer steps have to shrink to so much each
@@ -55,7 +56,7 @@ class Corrected(NamedTuple):
 class _Points(NamedTuple):
     """Points under way, (size, batch) and (batch,), and the cell of each that is held at a target.
 
-    `stiffness` (cell, batch) is zero where nothing is held.
+    `stiffness` (cell, batch) is zero where nothing is held; what is met is held where it is.
     """
 
     coordinates: Array
@@ -105,7 +106,8 @@ def corrected(
     chosen = np.arange(family.followed.n_cells)[:, None] == cell
     stiffness = np.where(chosen, np.broadcast_to(family.stiffness, chosen.shape), 0.0)
     asked = ways or Ways(np.zeros(n, bool), np.full(n, -1))
-    here = _Points(guess, load, chosen, stiffness, np.where(cell >= 0, target, 0.0), *asked)
+    target = np.where(asked.meeting >= 0, np.nan, np.where(cell >= 0, target, 0.0))
+    here = _Points(guess, load, chosen, stiffness, target, *asked)
     before, are_done = np.full(n, np.inf), np.zeros(n, bool)
     found: Corrected | None = None
     astray = before
@@ -117,7 +119,7 @@ def corrected(
             far = np.where(look.length > SETTLED_STEP, look.length / before / SHRINKING, 0.0)
             astray[lanes] = np.maximum(astray[lanes], far)
         is_there = look.is_there & ((count > 0) | (ways is None))
-        is_near = here.is_rough & (look.length <= SETTLED_STEP)
+        is_near = here.is_rough & (look.length <= ROUGH_STEP)
         is_lost = np.full(len(lanes), count == MAX_CORRECTIONS)
         if ways is not None:
             is_lost |= ~(look.length <= np.maximum(GROWING * before, ASTRAY))
@@ -189,10 +191,10 @@ def _put(own: Any, others: Any, lanes: Indices, which: Indices) -> None:
 
 
 def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth: int) -> _Look:
-    coordinates, is_held = family.coordinates, here.chosen.any(axis=0)
+    coordinates, is_held, meets = family.coordinates, here.chosen.any(axis=0), here.meeting >= 0
     linear = family.linearized(here.coordinates, here.load, here.stiffness, here.target, depth)
     measured, rows, gradient = linear.followed, family.followed.rows, linear.gradient
-    away = np.where(here.chosen, measured.value - here.target, 0.0).sum(axis=0)
+    away = np.where(here.chosen & ~meets, measured.value - here.target, 0.0).sum(axis=0)
     factors = factorize(linear.hessian, family.column_depths)
     selector = spread(rows, measured, here.chosen.astype(float), here.coordinates)
     sides = np.stack((-gradient, -linear.rate, selector), axis=1)
@@ -202,10 +204,8 @@ def _look(family: LoadedPotential[Coordinates, LoadedLaw], here: _Points, depth:
     step = by_residual + change * by_load
     scale = np.where(here.chosen, np.broadcast_to(family.scale, here.chosen.shape), 0.0).sum(axis=0)
     is_held_there = np.abs(away) <= TOLERANCE * np.where(is_held, scale, 1.0)
-    if (here.meeting >= 0).any():
-        meets, pull = here.meeting >= 0, here.stiffness.sum(axis=0) * away
-        found = _met(family, here, linear, selector, away, (by_residual, by_load, by_hold))
-        gradient = np.where(meets, gradient - pull * selector, gradient)
+    if meets.any():
+        found = _met(family, here, linear, selector, (by_residual, by_load, by_hold))
         change, step = np.where(meets, found.change, change), np.where(meets, found.step, step)
         is_held_there = np.where(meets, np.abs(found.margin) <= CROSSED, is_held_there)
     residual = np.abs(gradient / coordinates.gradient_scale).max(axis=0)
@@ -231,17 +231,16 @@ def _met(
     here: _Points,
     linear: Linearized,
     selector: Array,
-    away: Array,
     solved: tuple[Array, Array, Array],
 ) -> _Meeting:
     """Newton's step to where the margins of cells vanish: q is free, and the load is.
 
-    With r, b and c = H'⁻¹ (−g', −∂g/∂λ, ∇q) and a spring of k it is r + δλ b + u c, so that
-    ∇q · δx = u/k − away; the other equation is that of the margin m, linear in a small step. Where
-    no cell is held u = 0.
+    With r, b and c = H'⁻¹ (−g, −∂g/∂λ, ∇q) and a spring of k that is at rest here it is
+    r + δλ b + u c, so that ∇q · δx = u/k; the other equation is that of the margin m, linear in a
+    small step. Where no cell is held u = 0.
     """
     by_residual, by_load, by_hold = solved
-    cell = np.maximum(here.meeting, 0), np.arange(len(away))
+    cell = np.maximum(here.meeting, 0), np.arange(len(here.load))
     loaded, before = linear.loaded, family.law.margin(linear.loaded, here.load)
     assert before is not None, "what is met has a margin"
     margin = before[cell]
@@ -254,7 +253,7 @@ def _met(
         assert after is not None, "it does"
         return np.asarray((after[cell] - margin) / share)
 
-    by_target = total(selector * by_residual) + away
+    by_target = total(selector * by_residual)
     stiffness = here.stiffness.sum(axis=0)
     is_held = stiffness > 0.0
     a = np.where(is_held, 1.0 / np.where(is_held, stiffness, 1.0) - total(selector * by_hold), 1.0)

@@ -194,7 +194,10 @@ class LoadedPotential(Generic[System, Law]):
     def linearized(
         self, coordinates: Array, load: Array, stiffness: Array, target: Array, depth: int
     ) -> Linearized:
-        """Derivatives at coordinates, (size, batch), with cells held as in `held`."""
+        """Derivatives at coordinates, (size, batch), with cells held as in `held`.
+
+        Where the target is NaN cells are held where they are.
+        """
         gradient = np.zeros_like(coordinates)
         hessian = np.zeros((depth + 1, *coordinates.shape))
         for term in (*self.terms, *self._grown(load)):
@@ -202,6 +205,7 @@ class LoadedPotential(Generic[System, Law]):
             response = term.law(measured.value)
             assemble(term.measure.rows, measured, response, gradient, hessian)
         loaded, followed = self.looked_at(coordinates)
+        target = np.where(np.isnan(target), followed.value, target)
         law = self.law.at(load)
         if self.is_by_load:
             law = Holding(law, stiffness, target)
