@@ -150,9 +150,16 @@ class LoadedPotential(Generic[System, Law]):
     def take_lanes(self, index: Indices) -> "LoadedPotential[System, Law]":
         """The same potential for some lanes of the batch."""
         followed = self.followed.take_lanes(index)
+
+        def taken(term: Term) -> Term:
+            law = term.law.take_lanes(index)
+            is_followed = term.measure is self.followed
+            measure = followed if is_followed else term.measure.take_lanes(index)
+            return Term(term.kind, measure, law)
+
         return LoadedPotential(
             self.coordinates.take_lanes(index),
-            tuple(term.take_lanes(index) for term in self.terms),
+            tuple(taken(term) for term in self.terms),
             followed if self.is_by_load else self.measure.take_lanes(index),
             self.law.take_lanes(index),
             followed,
@@ -180,8 +187,11 @@ class LoadedPotential(Generic[System, Law]):
         return self._with(self.law.at(load), load, hold)
 
     def _with(self, law: ScalarLaw, load: Array, *others: Term) -> Potential[System]:
-        loaded = Term("loaded", self.measure, law)
+        loaded = self._loaded(law)
         return Potential(self.coordinates, (*self.terms, loaded, *self._grown(load), *others))
+
+    def _loaded(self, law: ScalarLaw) -> Term:
+        return Term("loaded", self.measure, law)
 
     def _grown(self, load: Array) -> tuple[Term, ...]:
         return tuple(replace(term, law=ShareOfLaw(term.law, load)) for term in self.growing)
@@ -200,19 +210,19 @@ class LoadedPotential(Generic[System, Law]):
         """
         gradient = np.zeros_like(coordinates)
         hessian = np.zeros((depth + 1, *coordinates.shape))
-        for term in (*self.terms, *self._grown(load)):
-            measured = term.measure(coordinates)
-            response = term.law(measured.value)
-            assemble(term.measure.rows, measured, response, gradient, hessian)
         loaded, followed = self.looked_at(coordinates)
-        target = np.where(np.isnan(target), followed.value, target)
-        law = self.law.at(load)
-        if self.is_by_load:
-            law = Holding(law, stiffness, target)
-        else:
+        target, is_held = np.where(np.isnan(target), followed.value, target), False
+        for term in (*self.terms, *self._grown(load), self._loaded(self.law.at(load))):
+            measure, law = term.measure, term.law
+            if measure is self.followed:
+                law, is_held = law if is_held else Holding(law, stiffness, target), True
+                measured = followed
+            else:
+                measured = loaded if measure is self.measure else measure(coordinates)
+            assemble(measure.rows, measured, law(measured.value), gradient, hessian)
+        if not is_held:
             hold = Holding(None, stiffness, target)
             assemble(self.followed.rows, followed, hold(followed.value), gradient, hessian)
-        assemble(self.measure.rows, loaded, law(loaded.value), gradient, hessian)
         rate = spread(self.measure.rows, loaded, self.law.rate(loaded.value, load), gradient)
         for term in self.growing:
             at = term.measure(coordinates)

@@ -45,7 +45,14 @@ from dpgcli.grasping.shapes import ContactShapes
 from dpgcli.mechanics.coordinates import FingerCoordinates, FingerPotential
 from dpgcli.mechanics.mirror import Heights
 from dpgcli.mechanics.pressure import PressureWork
-from dpgcli.mechanics.terms import DeadLoad, DomeSprings, Quadratic, without_domes
+from dpgcli.mechanics.terms import (
+    DOMES,
+    DeadLoad,
+    DomeSprings,
+    Quadratic,
+    springs_merged,
+    without_domes,
+)
 from dpgcli.records import dataclass
 
 ROUNDING = 1e-13  # of the forces in play: a smaller push is none
@@ -100,7 +107,8 @@ class Obstructed(Layout):
     def _terms_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
         """The terms of fingers and body that do not know the load."""
         n, size = len(own), self.n_own
-        terms = [terms_of_part(alone.terms, finger, n, size) for finger, alone in enumerate(own)]
+        merged = [springs_merged(alone.coordinates, alone.terms) for alone in own]
+        terms = [terms_of_part(alone, finger, n, size) for finger, alone in enumerate(merged)]
         resistance = None if self.motion is None else self.motion.resistance
         resisting = () if resistance is None else (Term("body", self._opening, resistance),)
         holding = self._holding(1.0)
@@ -156,21 +164,22 @@ class Obstructed(Layout):
         law = ActiveConstraints(
             active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
         )
-        terms = (*self._terms_of(own), multiplier_term(system))
+        bare = self._terms_of(own)
+        domes = self.travels or tuple(term.measure for term in bare if term.kind == DOMES)
         beside = np.concatenate((active[: self.n_gaps], active[self.n_gaps + self.n_travels :]))
         return LoadedPotential(
             system,
-            terms,
+            (*bare, multiplier_term(system)),
             Slack(gaps, frame.size, multiplied),
             law,
-            *self._followed(self._domes_of(own)),
+            *self._followed(domes),
             self._growing_of(own),
             n_multipliers=multiplied.n,
             may_kink=np.asarray(beside.any(axis=0)),
         )
 
     def _followed(
-        self, domes: tuple[OfPart | OwnCoordinate, ...]
+        self, domes: tuple[Measure | WideMeasure, ...]
     ) -> tuple[Measure | WideMeasure, Array, Array]:
         """By what paths are followed, its scale and what holds it: by domes.
 

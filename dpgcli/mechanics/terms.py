@@ -15,7 +15,7 @@ from dpgcli.mechanics.finger import GRAVITY, Finger
 from dpgcli.records import dataclass
 
 Formulate = Callable[[Finger], FingerPotential]
-LOAD = "load"  # the kind of the terms of dead loads
+DOMES, LOAD = "bistable", "load"  # the kinds of the terms of domes, and of dead loads
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def finger_terms(coordinates: FingerCoordinates) -> tuple[Term, ...]:
     hinges = coordinates.corners if "hinge_stiffness" in finger.parts else ()
     domes, wall = DomeSprings(finger.law, finger.domes), Quadratic(finger.bistable_stiffness)
     return (
-        Term("bistable", coordinates.dome, domes),
+        Term(DOMES, coordinates.dome, domes),
         *(Term("wall", yielding, wall) for yielding in coordinates.walls),
         *(Term("hinge", angle, corner) for angle in hinges),
         *_couplings(coordinates),

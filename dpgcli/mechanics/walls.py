@@ -153,6 +153,12 @@ class Walled:
     def _beside(self, measure: Measure) -> Beside:
         return Beside(measure, self.width)
 
+    def _seen(self, measure: Measure) -> Measure:
+        """A measure among walls: one of the coordinates stays one."""
+        beside = self._beside(measure)
+        own = isinstance(measure, OwnCoordinate)
+        return OwnCoordinate(beside.rows[0], measure.n_cells) if own else beside
+
     @cached_property
     def opening(self) -> Beside:
         """Extension x between a unit's tops, mm."""
@@ -172,12 +178,12 @@ class Walled:
     def corners(self) -> tuple[Measure, Measure]:
         """Those of the frame."""
         near, far = self.frame.corners
-        return self._beside(near), self._beside(far)
+        return self._seen(near), self._seen(far)
 
     @property
     def bars(self) -> tuple[Measure, ...]:
         """Those of the frame."""
-        return tuple(map(self._beside, self.frame.bars))
+        return tuple(map(self._seen, self.frame.bars))
 
     def position(self, axis: int) -> Measure:
         """The tip's x (axis 0) or y (axis 1), mm."""
