@@ -116,7 +116,8 @@ def corrected(
         if not count:
             astray = look.length / STRAYING
         elif count == 1:
-            far = np.where(look.length > SETTLED_STEP, look.length / before / SHRINKING, 0.0)
+            is_far = (look.length > SETTLED_STEP) & ~are_done
+            far = np.where(is_far, look.length / before / SHRINKING, 0.0)
             astray[lanes] = np.maximum(astray[lanes], far)
         is_there = look.is_there & ((count > 0) | (ways is None))
         is_near = here.is_rough & (look.length <= ROUGH_STEP)
