@@ -62,7 +62,10 @@ def one_step(
     depth: int,
     largest_step: float,
 ) -> Indices:
-    """Move each walk on by one step, or shorten its step; outcomes of those that end, else −1."""
+    """Move each walk on by one step, or shorten its step; outcomes of those that end, else −1.
+
+    Where some have come to a fold these alone are moved.
+    """
     ending = np.full(len(end), -1)
     to_fold = distance_to_fold(walk.slope, walk.last_slope, walk.last)
     is_before = (end - walk.load) * towards > 0.0  # a step by a cell may have led beyond
@@ -70,6 +73,7 @@ def one_step(
     if is_fold.any():
         land(walk, is_fold, to_fold, towards)
         ending[is_fold] = PathEnd.FOLD
+        return ending
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
     trial = _tried(family, walk, step, end, towards, depth, _rough(family, walk, step, to_fold))
@@ -80,7 +84,7 @@ def one_step(
     is_away = walk.margin > AWAY
     meets, crossed = is_away & (np.abs(margin) <= AWAY), _crossed(walk.margin, margin, is_away)
     is_event = trial.is_fine & ~is_beyond & ~is_over & (crossed < 0.0).any(axis=0)
-    accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event & (ending < 0)
+    accepted = trial.is_fine & ~is_beyond & ~is_over & ~is_event
     first = 1.0 + crossed.min(axis=0)  # the share of the step up to the first event
     is_bent = walk.is_beyond & (walk.meeting < 0)
     first = np.where(is_bent, CLOSER * first, first)  # margins that bend: from nearer by
@@ -89,7 +93,7 @@ def one_step(
     part = np.where(is_over, dip, np.where(is_event, first, _by_guess(trial, nearer)))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
     is_kinked = (walk.cell < 0) & may_kink(family, len(end)) & ~is_event
-    is_stuck = ~accepted & (ending < 0) & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
+    is_stuck = ~accepted & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     is_within = (trial.there.load - end) * towards <= 0.0  # what is met beyond the end is not met
     landed = (accepted & ~is_last & is_within & meets.any(axis=0)) | (is_stuck & is_event)
