@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.design.bodies import Body, Disc
@@ -87,6 +86,8 @@ def begins_in_base(scene: Scene, body: Body) -> Flags:
 
 def _is_in(corners: Array, low: Array, high: Array) -> Flags:
     """Whether polygons, (2, corner[, design]), meet struts from one y to another at x = 0."""
+    import shapely  # that discs do not need
+
     low, high = np.broadcast_arrays(np.reshape(low, -1), np.reshape(high, -1))
     ends = np.stack((np.stack((0.0 * low, low)), np.stack((0.0 * high, high))))
     struts = shapely.linestrings(np.moveaxis(ends, -1, 0))

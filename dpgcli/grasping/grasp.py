@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Flags
@@ -246,6 +245,8 @@ def _is_entered(nodes: Array, body: Obstacle) -> Flags:
     enters = np.zeros(nodes.shape[2], bool)
     lanes = np.flatnonzero(np.isfinite(nodes).all(axis=(0, 1)))
     if len(body.plates) and len(lanes):
+        import shapely  # that discs do not need
+
         area = shapely.polygons(body.take_lanes(lanes).points.transpose(2, 1, 0))
         inner = shapely.buffer(area, -SLIGHT, join_style="mitre")
         faces = shapely.linestrings(nodes[..., lanes].transpose(2, 1, 0))

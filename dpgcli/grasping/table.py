@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import field, replace
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from dpgcli.arrays import Array, Codes, Columns, Indices, distinct
@@ -309,21 +308,37 @@ def _between(found: Grasps, is_there: NDArray[np.bool_]) -> Columns:
         nodes = Stations(*(values[..., lanes] for values in finger.nodes))
         halves.append(place_in_gripper(found.scene.gripper, thickness, nodes).aperture)
     overlaps = np.zeros(len(is_there), bool)
-    upper, lower = (_outlines(found, finger, is_there) for finger in range(2))
-    within = shapely.buffer(upper, -SLIGHT, join_style="mitre")  # fingers that touch do not
-    overlaps[is_there] = shapely.intersects(within, lower)
+    overlaps[is_there] = _overlaps(*(_outlines(found, finger, is_there) for finger in range(2)))
     aperture = _rounded(0.5 * np.sum(halves, axis=0), found.scene.finger.straight_length)
     return {"aperture_mm": np.where(is_there, aperture, np.nan), "overlaps": overlaps}
 
 
-def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> NDArray[np.object_]:
-    """Polygons of a finger of some rows in the gripper: its face, and its tops back."""
+def _overlaps(upper: Array, lower: Array) -> NDArray[np.bool_]:
+    """Whether outlines, (2, point, row), overlap: those that touch do not."""
+    overlaps = np.zeros(upper.shape[2], bool)
+    lowest, highest = (
+        np.array([f(own, axis=1) for own in (upper, lower)]) for f in (np.min, np.max)
+    )
+    near = np.flatnonzero((lowest <= highest[::-1]).all(axis=(0, 1)))
+    if len(near):
+        import shapely  # that fingers far from each other do not need
+
+        first, second = (
+            shapely.polygons(own[:, :, near].transpose(2, 1, 0)) for own in (upper, lower)
+        )
+        within = shapely.buffer(first, -SLIGHT, join_style="mitre")
+        overlaps[near] = shapely.intersects(within, second)
+    return overlaps
+
+
+def _outlines(found: Grasps, finger: int, rows: NDArray[np.bool_]) -> Array:
+    """Outlines of a finger of some rows in the gripper, (2, point, row): face, and tops back."""
     own, height = found.fingers[finger], found.scene.finger.segment_height
     base = np.stack((0.0 * own.face[0, :1], own.face[1, :1] * 0.0 + height))
     tops = np.stack((own.nodes.top_x, own.nodes.top_y))
     around = np.concatenate((own.face, tops[:, ::-1], base), axis=1)
     around = around[:, :, found.pairs[finger, rows]]
-    return np.asarray(shapely.polygons(found.frames[finger].placed(around).transpose(2, 1, 0)))
+    return found.frames[finger].placed(around)
 
 
 def _texts(codes: Codes, n_units: int) -> NDArray[np.str_]:
