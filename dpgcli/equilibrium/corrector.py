@@ -17,7 +17,7 @@ from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, al
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap: what is left to go
-ROUGH_STEP = 1e-3  # of the step cap: the last one to points that are rough; Newton squares it
+LAST_STEP, ROUGH_STEP = 1e-7, 1e-3  # of the step cap: Newton squares it; to points that are rough
 CROSSED = 1e-11  # of what margins are measured by: as near Newton comes to an event
 STRAYING, SHRINKING = 0.05, 0.25  # of the step cap; of a step: what guesses are good for
 ASTRAY, GROWING = 1e-2, 0.8  # of the step cap: longer steps have to shrink to so much each
@@ -120,7 +120,7 @@ def corrected(
             far = np.where(is_far, look.length / before / SHRINKING, 0.0)
             astray[lanes] = np.maximum(astray[lanes], far)
         is_there = look.is_there & ((count > 0) | (ways is None))
-        is_near = here.is_rough & (look.length <= ROUGH_STEP)
+        is_near = (look.length <= np.where(here.is_rough, ROUGH_STEP, LAST_STEP))
         is_lost = np.full(len(lanes), count == MAX_CORRECTIONS)
         if ways is not None:
             is_lost |= ~(look.length <= np.maximum(GROWING * before, ASTRAY))
@@ -247,12 +247,7 @@ def _met(
     margin = before[cell]
 
     def rate(direction: Array, change: float) -> Array:
-        by_cell = along(family.measure.rows, loaded, direction)
-        share = SLIGHT / np.maximum(np.abs(by_cell).max(axis=0), max(change, TOLERANCE))
-        moved = loaded._replace(value=loaded.value + share * by_cell)
-        after = family.law.margin(moved, here.load + share * change)
-        assert after is not None, "it does"
-        return np.asarray((after[cell] - margin) / share)
+        return margin_rate(family, loaded, here.load, direction, change)[cell]
 
     by_target = total(selector * by_residual)
     stiffness = here.stiffness.sum(axis=0)
@@ -264,6 +259,24 @@ def _met(
     pull = np.where(is_held, by_target * e - b * f, 0.0) / determinant
     change = (a * f - np.where(is_held, by_target, 0.0) * d) / determinant
     return _Meeting(margin, by_residual + change * by_load + pull * by_hold, change)
+
+
+def margin_rate(
+    family: LoadedPotential[Coordinates, LoadedLaw],
+    loaded: Measured | WideMeasured,
+    load: Array,
+    direction: Array,
+    change: float | Array,
+) -> Array:
+    """How margins to events change in a direction, (size, batch), as the load does, (cell, batch)."""
+    by_cell = along(family.measure.rows, loaded, direction)
+    furthest = np.maximum(np.abs(by_cell).max(axis=0), np.maximum(np.abs(change), TOLERANCE))
+    share = SLIGHT / furthest
+    before = family.law.margin(loaded, load)
+    moved = loaded._replace(value=loaded.value + share * by_cell)
+    after = family.law.margin(moved, load + share * change)
+    assert before is not None and after is not None, "what is met has a margin"
+    return np.asarray((after - before) / share)
 
 
 def _solved(factors: Factorization, sides: Array) -> Array:

@@ -10,7 +10,9 @@ from dpgcli.equilibrium.contracts import Coordinates
 from dpgcli.equilibrium.corrector import TOLERANCE, Corrected, Ways, corrected, motion_by, slope_by
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential
 from dpgcli.equilibrium.walk import (
+    AWAY,
     BY_SECANTS,
+    UNFORESEEN,
     PathEnd,
     Walk,
     along_bend,
@@ -20,6 +22,7 @@ from dpgcli.equilibrium.walk import (
     margin_of,
     may_kink,
     slope_bend,
+    to_events_ahead,
     turn,
 )
 
@@ -29,7 +32,6 @@ FOLD_DISTANCE = 2e-6  # of the scale: what is left of λ is then of order 1e-12
 KINK = 1e-2  # of the scale: a contact that slides over a corner moves other cells than before
 AT_KINK = 1e-6  # of the load: as near a path comes to a kink beyond which nothing is found
 CLOSER = 0.98  # of the estimated distance: the next point is still before the fold
-AWAY = 1e-9  # of the forces in play: what is nearer to an event may be at it, rounding aside
 SMALLEST_STEP = 1e-9  # of the scale
 PLACES = 64  # on a step, at which laws from points are looked at,
 GRAZING = 0.03  # of a step that has led beyond an event which may be at its start
@@ -76,6 +78,7 @@ def one_step(
         return ending
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
+    usual, step = step, _to_foreseen(family, walk, step)
     trial = _tried(family, walk, step, end, towards, depth, _rough(family, walk, step, to_fold))
     step, slope, margin, is_last = trial.step, trial.slope, trial.margin, trial.is_last
     is_beyond = trial.is_fine & ~is_last & (slope <= 0.0)
@@ -92,6 +95,8 @@ def one_step(
     nearer = 1.0 / np.sqrt(trial.there.astray)  # NaN where there is nothing
     part = np.where(is_over, dip, np.where(is_event, first, _by_guess(trial, nearer)))
     shorter = np.where(is_beyond, CLOSER * to_root, part) * step
+    is_unforeseen = trial.is_meeting & ~trial.is_fine & ~walk.is_beyond
+    shorter = np.where(is_unforeseen, usual, shorter)
     is_kinked = (walk.cell < 0) & may_kink(family, len(end)) & ~is_event
     is_stuck = ~accepted & (shorter < np.where(is_kinked, AT_KINK, SMALLEST_STEP))
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
@@ -100,13 +105,13 @@ def one_step(
     longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
     longer = np.fmin(longer, step * nearer)
     walk.step = np.where(accepted, longer, shorter)
-    walk.is_beyond = is_event
     by_load = ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK)
     by_load &= may_kink(family, len(end))
     if by_load.any():
         go_by_load(walk, by_load)
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
     walk.meeting = _to_meet(family, walk, trial, np.where(is_event, event_cell, -1), is_away)
+    walk.is_beyond = is_event
     event = _at_event(family, walk, trial, event_cell) if landed.any() else None
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
@@ -118,6 +123,19 @@ def one_step(
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _to_foreseen(
+    family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array
+) -> Array:
+    """Steps that are no longer than to the next contact as margins fall here, which is to be met."""
+    if family.may_kink is None:
+        return step
+    ahead = to_events_ahead(walk)
+    first = ahead.min(axis=0)
+    is_foreseen = (walk.meeting == -1) & (first <= step)
+    walk.meeting = np.where(is_foreseen, ahead.argmin(axis=0), walk.meeting)
+    return np.where(is_foreseen, first, step)
 
 
 def _rough(
@@ -163,9 +181,11 @@ def _to_meet(
     if family.may_kink is None:
         return np.full(len(cell), BY_SECANTS)
     is_lost = trial.is_meeting & ~trial.is_fine
-    by_secants = is_lost | (walk.meeting == BY_SECANTS)
+    by_secants = (is_lost & walk.is_beyond) | (walk.meeting == BY_SECANTS)
     is_met = (cell >= 0) & is_away[np.maximum(cell, 0), np.arange(len(cell))] & ~by_secants
-    return np.where(is_met, cell, np.where(by_secants, BY_SECANTS, -1))
+    is_unforeseen = is_lost | (walk.meeting == UNFORESEEN)
+    other = np.where(by_secants, BY_SECANTS, np.where(is_unforeseen, UNFORESEEN, -1))
+    return np.where(is_met, cell, other)
 
 
 def _tried(

@@ -7,12 +7,14 @@ import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.contracts import Coordinates
-from dpgcli.equilibrium.corrector import Corrected, motion_by
+from dpgcli.equilibrium.corrector import Corrected, margin_rate, motion_by
 from dpgcli.equilibrium.loaded import LoadedLaw, LoadedPotential, along
 from dpgcli.records import dataclass
 
+AWAY = 1e-9  # of the forces in play: what is nearer to an event may be at it, rounding aside
 FIRST_STEP = 0.5  # of the step cap: of what moves most, where it is not known how it bends
 BY_SECANTS = -2  # instead of a cell: an event is come near to from before
+UNFORESEEN = -3  # the same: the one that was foreseen is not there
 
 
 class PathEnd(IntEnum):
@@ -32,9 +34,11 @@ class Walk:
     `onward` and the load by `slope`, positive towards its end. `step` is the next one, `last` the
     one before and `last_slope` the slope there, NaN if another cell was followed; `bend` is how
     `onward` changes per step since then, zero if that is not known. Where nothing moves `cell` is
-    −1, and steps are of the load itself. `is_beyond` says that the last step that was tried led
+    −1, and steps are of the load itself. `margin` (cell, batch) is that to events, and `falling` by
+    how much less it becomes per step. `is_beyond` says that the last step that was tried led
     beyond an event; then `meeting` is the cell whose margin vanishes there, to be gone to, −1 if
-    there is none, and `BY_SECANTS` where it was not found. `count` is that of steps.
+    there is none, `BY_SECANTS` where it was not found, and `UNFORESEEN` where none was to be found
+    that seemed to be ahead. `count` is that of steps.
     """
 
     coordinates: Array
@@ -49,6 +53,7 @@ class Walk:
     last_slope: Array
     bend: Array
     margin: Array
+    falling: Array
     is_beyond: Flags
     meeting: Indices
     count: Indices
@@ -79,6 +84,12 @@ def margin_of(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) 
     return np.full(here.loaded.value.shape, np.inf) if margin is None else margin
 
 
+def to_events_ahead(walk: Walk) -> Array:
+    """Steps to where margins vanish that fall as they do here, (cell, batch); infinite for others."""
+    falls = (walk.falling > 0.0) & (walk.margin > AWAY)
+    return np.where(falls, walk.margin / np.where(falls, walk.falling, 1.0), np.inf)
+
+
 def may_kink(family: LoadedPotential[Coordinates, LoadedLaw], n: int) -> Flags:
     """Which of n lanes may have a kink on the way, where a contact slides over a corner."""
     return np.zeros(n, bool) if family.may_kink is None else family.may_kink
@@ -92,6 +103,7 @@ def go_by_load(walk: Walk, which: Flags) -> None:
     walk.step = np.where(which, walk.step * slope, walk.step)
     walk.last_slope = np.where(which, np.nan, walk.last_slope)
     walk.bend = np.where(which, 0.0, walk.bend)
+    walk.falling = walk.falling / slope
 
 
 def slope_bend(walk: Walk) -> Array:
@@ -155,6 +167,8 @@ def turn(
     walk.onward = onward
     walk.slope = np.where(moves, np.abs(by * per_step), 1.0)
     walk.last_slope = np.where(is_other, np.nan, walk.last_slope)
+    if family.may_kink is not None:
+        walk.falling = -margin_rate(family, here.loaded, here.load, onward, towards * walk.slope)
 
 
 def _furthest(family: LoadedPotential[Coordinates, LoadedLaw], motion: Array) -> Array:
