@@ -24,6 +24,7 @@ ASTRAY, GROWING = 1e-2, 0.8  # of the step cap: longer steps have to shrink to s
 SLIGHT = 1e-4  # mm: by so much scalars move where margins are told to change
 COMPACTING_SHARE = 0.25  # of ended lanes: from it on, dropping them pays for the copy
 MAX_CORRECTIONS = 8
+FEW = 64  # lanes: of no more it takes longer to drop some than to look at all
 
 
 class Ways(NamedTuple):
@@ -137,7 +138,7 @@ def corrected(
         rest, before = np.flatnonzero(~are_done), look.length
         if not len(rest):
             break
-        if are_done.mean() > COMPACTING_SHARE:
+        if are_done.mean() > COMPACTING_SHARE and are_done.size > FEW:
             lanes, own, here = lanes[rest], own.take_lanes(rest), here.only(rest)
             before, are_done = before[rest], are_done[rest]
     assert found is not None, "in the end all lanes have ended"

@@ -134,9 +134,10 @@ def _walked(
         if len(finished):
             _write(ends, active[finished], walk.only(finished), ending[finished])
             keep = np.flatnonzero(ending < 0)
-            active, walk, own = active[keep], walk.only(keep), own.take_lanes(keep)
+            active, walk = active[keep], walk.only(keep)
             if pauses and np.isin(ending, (PathEnd.ARRIVED, PathEnd.EVENT)).any():
                 break
+            own = own.take_lanes(keep)
     if walk is not whole:
         whole.put(active, walk, np.arange(len(active)))
     return ends, whole
