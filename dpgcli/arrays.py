@@ -24,6 +24,17 @@ def total(parts: Array) -> Array:
     return np.asarray(parts.sum(axis=0))
 
 
+def acting(values: Array) -> Indices:
+    """Where values are not zero, lane by lane, as many places as the fullest lane has; then others.
+
+    >>> acting(np.array([[0.0, 1.0], [2.0, 0.0], [3.0, 0.0]])).tolist()
+    [[1, 0], [2, 1]]
+    """
+    acts = values != 0.0
+    order = np.argsort(~acts, axis=0, kind="stable")
+    return order[: acts.sum(axis=0).max(initial=0)]
+
+
 def rotated(ways: Array, angle: float | Array) -> Array:
     """Directions (2, …, batch), turned counterclockwise by angles, (batch,) rad or one for all.
 

@@ -147,19 +147,23 @@ class Slack:
         """Those of the gaps and of the multipliers."""
         return (*self.gaps.rows, *(Row(0, self.size + k) for k in range(self.multiplied.n)))
 
+    @cached_property
+    def _by_multiplier(self) -> Array:
+        """−1 where a multiplier is a constraint's, (multiplier, cell, batch)."""
+        return np.where(self.multiplied.are_of(self.n_cells), -1.0, 0.0)
+
     def __call__(self, coordinates: Array) -> WideMeasured:
         """g − y with its derivatives, (cell, batch)."""
         gaps = self.gaps(coordinates[: self.size])
         n, n_rows, batch = self.multiplied.n, len(self.gaps.rows), coordinates.shape[1]
-        own = -self.multiplied.are_of(self.n_cells).astype(float)
-        own = np.broadcast_to(own, (n, self.n_cells, batch))
+        own = np.broadcast_to(self._by_multiplier, (n, self.n_cells, batch))
 
         def bent(force: Array) -> Array:
             whole = np.zeros((n_rows + n, n_rows + n, batch))
             whole[:n_rows, :n_rows] = gaps.bent(force)
             return whole
 
-        value = gaps.value - self.multiplied.spread(coordinates[self.size :], self.n_cells)
+        value = gaps.value + total(self._by_multiplier * coordinates[self.size :, None])
         return WideMeasured(value, np.concatenate((gaps.gradient, own)), bent, gaps.place)
 
     def take_lanes(self, index: Indices) -> Self:

@@ -5,7 +5,7 @@ from typing import Generic
 
 import numpy as np
 
-from dpgcli.arrays import Array, Indices, total
+from dpgcli.arrays import Array, Indices, acting, total
 from dpgcli.equilibrium.contracts import (
     Measured,
     Response,
@@ -155,14 +155,15 @@ def _assemble_wide(
     rows: tuple[Row, ...], q: WideMeasured, response: Response, gradient: Array, hessian: Array
 ) -> None:
     """The same for all cells at once: each has all rows."""
-    places = np.array([row.offset for row in rows])
-    gradient[places] += widely(q, response.force)
-    bend = q.bent(response.force)
-    for slope, stiffness in zip(np.moveaxis(q.gradient, 1, 0), response.stiffness, strict=True):
-        if stiffness.any():
-            bend += (stiffness * slope)[:, None] * slope
-    first, second, low, depth = _pairs(tuple(places.tolist()))
-    hessian[depth, low] += bend[first, second]
+    first, second, low, depth = _pairs(places := tuple(row.offset for row in rows))
+    gradient[list(places)] += widely(q, response.force)
+    bend = q.bent(response.force)[first, second]
+    cells, lanes = acting(response.stiffness), np.arange(gradient.shape[1])
+    stiffness, slopes = response.stiffness[cells, lanes], q.gradient[:, cells, lanes]
+    stiff = stiffness * slopes
+    for k in range(len(cells)):
+        bend += stiff[first, k] * slopes[second, k]
+    hessian[depth, low] += bend
 
 
 @cache  # the same few for every batch

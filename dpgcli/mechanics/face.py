@@ -20,15 +20,15 @@ derivation).
 """
 
 from dataclasses import field, replace
-from functools import cache, cached_property
+from functools import cache
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from dpgcli.arrays import Array, Flags, Indices, rotated, total
 from dpgcli.equilibrium.contracts import take_lanes
-from dpgcli.mechanics.chain_geometry import internal, pose_of
-from dpgcli.mechanics.coordinates import FingerCoordinates
+from dpgcli.mechanics.chain_geometry import pose_of
+from dpgcli.mechanics.coordinates import FingerCoordinates, Internal
 from dpgcli.records import dataclass
 
 
@@ -65,13 +65,14 @@ class FaceShape(NamedTuple):
     def pulled(self, forces: Array) -> Array:
         """Σ f · ∂F over nodes, (row, cell, batch), for forces f (2, node, cell, batch)."""
         x, y = self.nodes[:, :, None]
-        turning = forces[0] * y - forces[1] * x
-        from_x, from_y = (_summed_from_behind(part)[self.first] for part in forces)
-        moment = _summed_from_behind(turning)[self.first]
-        at_x, at_y = self.origin[:, :, None]
-        by_corner: Array = moment - (from_x * at_y - from_y * at_x)
-        along = from_x * at_x + from_y * at_y
-        result = np.where(self.is_corner[:, None, None], by_corner, along)
+        of_nodes = np.empty((3, *forces.shape[1:]))
+        of_nodes[:2], of_nodes[2] = forces, forces[0] * y - forces[1] * x
+        beyond = np.cumsum(of_nodes[:, ::-1], axis=1)[:, len(x) - 1 - self.first]
+        is_corner, (at_x, at_y) = self.is_corner[:, None], self.origin
+        way_x, way_y = np.where(is_corner, -at_y, at_x), np.where(is_corner, at_x, at_y)
+        result = beyond[0] * way_x[:, None]
+        result += beyond[1] * way_y[:, None]
+        result += np.where(is_corner[:, None], beyond[2], 0.0)
         if self.rate is not None:
             result[0] *= self.rate
         return result
@@ -99,9 +100,15 @@ class FaceShape(NamedTuple):
         return ways if self.angle is None else rotated(ways, -self.angle)
 
 
-def _summed_from_behind(values: Array) -> Array:
-    """Σ over nodes from each one on, (node, …)."""
-    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+@cache  # the same few for every batch
+def _moves(n_units: int, n_motions: int, turns: bool, is_rigid: bool) -> tuple[Indices, Flags]:
+    """The first node that each row of a face moves, and whether the row is a corner."""
+    kinds = [True, True] if is_rigid else [True, False, True]
+    first = np.repeat(np.arange(1, n_units + 1), len(kinds))
+    base = np.zeros(n_motions, np.int64)
+    is_corner = np.append(base < turns, np.tile(np.array(kinds), n_units))
+    is_corner[1:n_motions] = False
+    return np.append(base, first), is_corner
 
 
 @cache  # the same few for every batch
@@ -171,31 +178,18 @@ class Face:
     def _n_motions(self) -> int:
         return int(self.directions.shape[1]) + (self.pivot is not None)
 
-    @cached_property
-    def _moves(self) -> tuple[Indices, Flags]:
-        """The first node that each row moves, and whether the row is a corner."""
-        kinds = [True, True] if self.is_rigid else [True, False, True]
-        first = np.repeat(np.arange(1, self.n_units + 1), len(kinds))
-        is_corner = np.tile(np.array(kinds), self.n_units)
-        base = np.zeros(self._n_motions, np.int64)
-        is_turn = np.arange(len(base)) < self._n_motions - self.directions.shape[1]
-        return np.append(base, first), np.append(is_turn, is_corner)
-
     def shape(self, coordinates: Array) -> FaceShape:
         """The face at coordinates, (size, batch)."""
         n, n_motions = self.n_units, self._n_motions
         rows = coordinates[self.places[n_motions:]].reshape(n, -1, coordinates.shape[1])
-        zero = np.zeros((n, coordinates.shape[1]))
-        near, far = rows[:, 0], rows[:, -1]
-        chord = zero if self.is_rigid else rows[:, 1]
-        pose = pose_of(internal(_as_chain(chord, near, far), is_rigid=False), self.length)
-        base = np.zeros((2, 1, coordinates.shape[1]))
-        stations = np.concatenate((base, np.stack((pose.x, pose.y))), axis=1)
+        chord = np.zeros((1, 1)) if self.is_rigid else rows[:, 1]
+        pose = pose_of(Internal(chord, rows[:, 0], rows[:, -1], chord), self.length)
+        angle, stations = np.zeros((n + 1, coordinates.shape[1])), np.zeros((2, n + 1, coordinates.shape[1]))
+        angle[1:], stations[0, 1:], stations[1, 1:] = pose.strut_angle, pose.x, pose.y
         ways = self.directions
         if ways.shape[1]:
             moved = ways * coordinates[self.places[n_motions - ways.shape[1] : n_motions]]
             stations = stations - total(np.moveaxis(moved, 1, 0))[:, None]
-        angle = np.concatenate((base[0], pose.strut_angle))
         inwards = np.stack((np.sin(angle), -np.cos(angle)))
         pivots = [stations[:, :-1], stations[:, 1:]]
         if not self.is_rigid:
@@ -208,7 +202,8 @@ class Face:
         if self.has_end:
             top = stations[:, -1:] - self.height[-1:] * inwards[:, -1:]
             nodes = np.concatenate((nodes, top), axis=1)
-        shape = FaceShape(nodes, *self._moves, origin)
+        moves = _moves(n, n_motions, self.pivot is not None, self.is_rigid)
+        shape = FaceShape(nodes, *moves, origin)
         return shape if self.pivot is None else self._turned(shape, coordinates[self.places[0]])
 
     def _turned(self, shape: FaceShape, way: Array) -> FaceShape:
@@ -233,8 +228,3 @@ class Face:
         length, half, height, along = (take_lanes(part, index) for part in parts)
         own = replace(self, length=length, half_thickness=half, height=height, directions=along)
         return replace(own, pivot=self.pivot and self.pivot.take_lanes(index))
-
-
-def _as_chain(chord: Array, near: Array, far: Array) -> Array:
-    """Coordinates of an elastic chain whose struts keep their length."""
-    return np.stack((chord, near, far, 0.0 * near), axis=1).reshape(-1, near.shape[1])

@@ -19,7 +19,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from dpgcli.arrays import Array, Flags, Indices, total
+from dpgcli.arrays import Array, Flags, Indices, acting, total
 from dpgcli.equilibrium.contracts import Row, WideMeasured, take_lanes
 from dpgcli.mechanics.face import Face, FaceShape
 from dpgcli.mechanics.obstacle import Obstacle
@@ -101,15 +101,15 @@ class FaceGaps:
         moves = moves_of(shape, near)
         place, own, slope = self._at_points(near), self._own(near), moves.slope
         n_points = len(own)
-        pushes = np.zeros((2, len(shape.nodes[0]), 0, coordinates.shape[1]))
+        pushes: Array | None = None
         if len(self.obstacle.plates):
             plates = plate_gaps(shape, self.obstacle)
             place = np.concatenate((place, self._at_plates(plates, place)))
             own = np.concatenate((own, plates.distance.reshape(-1, coordinates.shape[1])))
             pushes = _pushed(plates)
             slope = np.concatenate((slope, shape.pulled(pushes)), axis=1)
-        value = np.take_along_axis(own, place, axis=0)
-        gradient = np.take_along_axis(slope, place[None], axis=1)
+        lanes = np.arange(coordinates.shape[1])
+        value, gradient = own[place, lanes], slope[:, place, lanes]
         if self.first is not None:
             is_told = one_at(place, self.first)
             value = np.where(is_told, value, FAR)
@@ -119,7 +119,7 @@ class FaceGaps:
             is_there = place[:, None] == np.arange(len(own))[:, None]
             by_place = total(np.where(is_there, force[:, None], 0.0))
             result = bent_by(shape, near, moves, by_place[:n_points])
-            if len(own) > n_points:
+            if pushes is not None:
                 result += shape.bent(total(np.moveaxis(pushes * by_place[n_points:], 2, 0)))
             return result
 
@@ -224,21 +224,19 @@ def one_at(place: Indices, first: Flags) -> Flags:
 def nearest(shape: FaceShape, centers: Array, *, has_end: bool = False) -> Nearest:
     """The nearest places of all sides of a face to points (2, point, batch)."""
     start = shape.nodes[:, None, :-1]
-    side_x, side_y = shape.nodes[:, None, 1:] - start
-    length = np.sqrt(side_x * side_x + side_y * side_y)
-    along_x, along_y = side_x / length, side_y / length
-    away_x, away_y = centers[:, :, None] - start
-    raw = (away_x * along_x + away_y * along_y) / length
+    side, away = shape.nodes[:, None, 1:] - start, centers[:, :, None] - start
+    length = np.sqrt(total(side * side))
+    along = side / length
+    inwards = np.stack((along[1], -along[0]))
+    raw = total(away * along) / length
     place, n = _followed(raw), raw.shape[1]
     share = np.minimum(np.maximum(raw, 0.0), 1.0)
-    is_corner = share != raw
-    is_corner |= (raw == 0.0) | (raw == 1.0)
-    off_line = away_x * along_y - away_y * along_x
+    is_corner = (raw <= 0.0) | (raw >= 1.0)
+    off_line = total(away * inwards)
     if has_end:
         place = _around_end(place, off_line)
-    reach = share * length
-    corner_x, corner_y = away_x - reach * along_x, away_y - reach * along_y
-    distance = np.sqrt(corner_x * corner_x + corner_y * corner_y)
+    corner = away - share * length * along
+    distance = np.sqrt(total(corner * corner))
     is_behind = off_line < 0.0
     is_behind[:, 0] &= raw[:, 0] >= 0.0
     is_behind[:, n - 1] &= raw[:, n - 1] <= 1.0
@@ -246,11 +244,8 @@ def nearest(shape: FaceShape, centers: Array, *, has_end: bool = False) -> Neare
     signed = np.where(is_corner, sign * distance, off_line)
     is_apart = is_corner & (distance > 0.0)
     outwards = sign / np.where(is_apart, distance, 1.0)
-    normal, tangent = np.empty((2, 2, *raw.shape))
-    normal[0] = np.where(is_apart, outwards * corner_x, along_y)
-    normal[1] = np.where(is_apart, outwards * corner_y, -along_x)
-    np.negative(normal[1], out=tangent[0])
-    tangent[1] = normal[0]
+    normal = np.where(is_apart, outwards * corner, inwards)
+    tangent = np.stack((-normal[1], normal[0]))
     length = np.broadcast_to(length, raw.shape)
     return Nearest(place, share, signed, normal, tangent, length, is_corner)
 
@@ -260,15 +255,14 @@ def _followed(raw: Array) -> Indices:
 
     A corner that is nearest to both its sides belongs to the first of them.
     """
-    n = raw.shape[1]
-    numbers = np.broadcast_to(np.arange(n)[None, :, None], raw.shape)
-    target = numbers.copy()
-    target[:, 1:] = np.where(raw[:, 1:] <= 0.0, numbers[:, :-1], target[:, 1:])
-    onwards = (raw[:, :-1] >= 1.0) & (raw[:, 1:] > 0.0)
-    target[:, :-1] = np.where(onwards, numbers[:, 1:], target[:, :-1])
+    _, n, batch = raw.shape
+    to_next, target = np.zeros(raw.shape, np.int64), np.arange(raw.size).reshape(raw.shape)
+    to_next[:, 1:] -= raw[:, 1:] <= 0.0
+    to_next[:, :-1] += (raw[:, :-1] >= 1.0) & (raw[:, 1:] > 0.0)
+    target += batch * to_next
     for _ in range((n - 1).bit_length()):  # twice as far each time
-        target = np.take_along_axis(target, target, axis=1)
-    return target
+        target = np.take(target, target)
+    return target // batch % n
 
 
 def _around_end(place: Indices, off_line: Array) -> Indices:
@@ -304,20 +298,18 @@ def moves_of(shape: FaceShape, near: Nearest) -> Moves:
 
 
 def turns_of(shape: FaceShape, near: Nearest, cells: Indices) -> tuple[Array, Array]:
-    """The w and the τ of some sides and bodies by the coordinates, (row, cell, batch)."""
+    """The w and the τ of some sides and bodies, (cell, 1 or batch): (row, cell, batch)."""
     _, _, n, batch = near.normal.shape
-    normal, along = (v.reshape(2, -1, batch)[:, cells] for v in (near.normal, near.along))
-    share, length = (v.reshape(-1, batch)[cells] for v in (near.share, near.length))
-    is_corner = near.is_corner.reshape(-1, batch)[cells]
-    turn = np.where(is_corner, 0.0, 1.0 / length) * normal
-    forces, sides, number = (
-        np.zeros((2, n + 1, 2 * len(cells), batch)),
-        cells % n,
-        np.arange(len(cells)),
-    )
-    forces[:, sides, number], forces[:, sides + 1, number] = turn, -turn
+    lanes, number = np.arange(batch), np.arange(len(cells))[:, None]
+    normal, along = (v.reshape(2, -1, batch)[:, cells, lanes] for v in (near.normal, near.along))
+    parts = (near.share, near.length, near.is_corner)
+    share, length, is_corner = (v.reshape(-1, batch)[cells, lanes] for v in parts)
+    turn, slid = np.where(is_corner, 0.0, 1.0 / length) * normal, share * along
+    forces, sides = np.zeros((2, n + 1, 2 * len(cells), batch)), cells % n
+    forces[:, sides, number, lanes], forces[:, sides + 1, number, lanes] = turn, -turn
     number = number + len(cells)
-    forces[:, sides, number], forces[:, sides + 1, number] = (share - 1.0) * along, -share * along
+    forces[:, sides, number, lanes] = slid - along
+    forces[:, sides + 1, number, lanes] = -slid
     pulled = shape.pulled(forces)
     return pulled[:, : len(cells)], pulled[:, len(cells) :]
 
@@ -333,18 +325,21 @@ def _at_ends(start: Array, end: Array, sides: Indices, n_sides: int) -> Array:
 
 def bent_by(shape: FaceShape, near: Nearest, moves: Moves, force: Array) -> Array:
     """Σ F ∇²g over places, (row, row, batch), for forces (place, batch)."""
-    batch = force.shape[1]
+    batch, cells = force.shape[1], acting(force)
+    if not len(cells):
+        return np.zeros((len(shape.first), len(shape.first), batch))
     result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
-    distance, is_corner = (part.reshape(-1, batch) for part in (near.distance, near.is_corner))
-    cells = np.flatnonzero(force.any(axis=1))
+    parts = (part.reshape(-1, batch) for part in (force, near.distance, near.is_corner))
+    force, distance, is_corner = (part[cells, np.arange(batch)] for part in parts)
+    is_around = is_corner & (distance != 0.0)
+    around = np.where(is_around, force / np.where(is_around, distance, 1.0), 0.0)
     turn, slide = turns_of(shape, near, cells)
-    for place, cell in enumerate(cells):  # of sides w (τ − ½ g w)ᵀ F and its mirror image
-        w, tau, f, g = turn[:, place], slide[:, place], force[cell], distance[cell]
-        mixed = w[:, None] * (f * tau - (0.5 * f * g) * w)
+    by_side = force * slide - (0.5 * force * distance) * turn
+    by_corner = around * slide
+    for k in range(len(cells)):  # of sides w (τ − ½ g w)ᵀ F and its mirror image
+        mixed = turn[:, None, k] * by_side[:, k]
         result += mixed
         result += np.swapaxes(mixed, 0, 1)
-        is_around = is_corner[cell] & (g != 0.0)
-        if is_around.any():
-            around = np.where(is_around, f / np.where(is_around, g, 1.0), 0.0)
-            result += (around * tau)[:, None] * tau
+        if is_around[k].any():
+            result += by_corner[:, None, k] * slide[:, k]
     return result

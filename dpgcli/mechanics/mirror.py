@@ -226,7 +226,7 @@ class NodeGaps:
         n_rows, n_columns = len(self.face.places), len(self.other.places)
         mixed, own = np.zeros((n_rows, n_columns, batch)), np.zeros((n_columns, n_columns, batch))
         cells = np.flatnonzero(force.any(axis=1))
-        turn, slide = turns_of(shape, near, cells)
+        turn, slide = turns_of(shape, near, cells[:, None])
         for place, cell in enumerate(cells):
             tau = total(along[:, None, cell] * pull[:, :, cell])
             by_side = force[cell] * turn[:, place] + around[cell] * slide[:, place]
