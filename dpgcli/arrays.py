@@ -21,7 +21,7 @@ def total(parts: Array) -> Array:
     """
     if parts.shape[-1] == 1:
         return np.asarray(np.cumsum(parts, axis=0)[-1])
-    return np.asarray(parts.sum(axis=0))
+    return np.asarray(np.add.reduce(parts))
 
 
 def acting(values: Array) -> Indices:

@@ -15,7 +15,7 @@ from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.equilibrium.beginning import NO_RATE, about_to_act
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.loaded import LoadedPotential, along
-from dpgcli.equilibrium.steps import AWAY
+from dpgcli.equilibrium.walk import AWAY
 from dpgcli.mechanics.coordinates import FingerCoordinates
 
 PressedFamily = LoadedPotential[FingerCoordinates, PressedDomes]

@@ -121,7 +121,7 @@ def corrected(
             far = np.where(is_far, look.length / before / SHRINKING, 0.0)
             astray[lanes] = np.maximum(astray[lanes], far)
         is_there = look.is_there & ((count > 0) | (ways is None))
-        is_near = (look.length <= np.where(here.is_rough, ROUGH_STEP, LAST_STEP))
+        is_near = look.length <= np.where(here.is_rough, ROUGH_STEP, LAST_STEP)
         is_lost = np.full(len(lanes), count == MAX_CORRECTIONS)
         if ways is not None:
             is_lost |= ~(look.length <= np.maximum(GROWING * before, ASTRAY))
@@ -269,7 +269,7 @@ def margin_rate(
     direction: Array,
     change: float | Array,
 ) -> Array:
-    """How margins to events change in a direction, (size, batch), as the load does, (cell, batch)."""
+    """How margins to events change, (cell, batch), in a direction, (size, batch), with the load."""
     by_cell = along(family.measure.rows, loaded, direction)
     furthest = np.maximum(np.abs(by_cell).max(axis=0), np.maximum(np.abs(change), TOLERANCE))
     share = SLIGHT / furthest

@@ -167,7 +167,8 @@ def _begin(
     walk = Walk(
         here.coordinates, here.load, here.measured.value, np.zeros_like(coordinates),
         free.copy(), nothing, free.copy(), np.full(n, largest_step), free + np.nan, free + np.nan,
-        np.zeros_like(coordinates), margin, 0.0 * here.loaded.value, np.zeros(n, bool), nothing, 0 * nothing,
+        np.zeros_like(coordinates), margin, np.zeros_like(margin), np.zeros(n, bool), nothing,
+        0 * nothing,
     )  # fmt: skip
     turn(family, walk, here, nothing, towards)
     return walk, here.is_fine

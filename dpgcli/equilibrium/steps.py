@@ -125,10 +125,8 @@ def one_step(
     return ending
 
 
-def _to_foreseen(
-    family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array
-) -> Array:
-    """Steps that are no longer than to the next contact as margins fall here, which is to be met."""
+def _to_foreseen(family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array) -> Array:
+    """Steps no longer than to where a margin would vanish as it falls here: that is to be met."""
     if family.may_kink is None:
         return step
     ahead = to_events_ahead(walk)

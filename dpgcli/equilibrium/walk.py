@@ -85,7 +85,7 @@ def margin_of(family: LoadedPotential[Coordinates, LoadedLaw], here: Corrected) 
 
 
 def to_events_ahead(walk: Walk) -> Array:
-    """Steps to where margins vanish that fall as they do here, (cell, batch); infinite for others."""
+    """Steps to where margins vanish that fall as here, (cell, batch); infinite for others."""
     falls = (walk.falling > 0.0) & (walk.margin > AWAY)
     return np.where(falls, walk.margin / np.where(falls, walk.falling, 1.0), np.inf)
 

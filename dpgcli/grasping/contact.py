@@ -90,6 +90,14 @@ class Obstructed(Layout):
         own = self.potentials(inverted)
         if self.motion is None and self.ramp is None and len(own) == 1:
             return own[0]
+        terms = self._terms_of(own)
+        grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing_of(own))
+        return Potential(self._system(own), (*terms, *grown))
+
+    def _system(self, own: tuple[FingerPotential, ...]) -> Coordinates:
+        """The coordinates of fingers, body and domes."""
+        if self.motion is None and not self.n_travels and len(own) == 1:
+            return own[0].coordinates
         joined = Joined[FingerCoordinates](tuple(potential.coordinates for potential in own))
         system: Coordinates = joined
         if self.motion is not None:
@@ -100,9 +108,7 @@ class Obstructed(Layout):
             scales = 0.2 * finger.stroke, finger.force_scale / finger.stroke
             length, stiffness = map(self._by_finger, scales)
             system = Extended[Coordinates](system, self.n_travels, length, stiffness)
-        terms = self._terms_of(own)
-        grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing_of(own))
-        return Potential(system, (*terms, *grown))
+        return system
 
     def _terms_of(self, own: tuple[FingerPotential, ...]) -> tuple[Term, ...]:
         """The terms of fingers and body that do not know the load."""
@@ -158,14 +164,15 @@ class Obstructed(Layout):
     ) -> LoadedPotential[Constrained, ActiveConstraints]:
         """The Lagrangians of active contacts, (cell, batch), by the load."""
         own = self.potentials(inverted)
-        frame = self.bare(inverted, np.zeros(1)).coordinates
+        frame = self._system(own)
         gaps, multiplied = self.gaps(), self._multiplied(active)
         system = Extended(frame, multiplied.n, self.large, self.stiffness)
         law = ActiveConstraints(
             active, self.stiffness, self._deep, self.large[0], self.are_kept, self._limits
         )
         bare = self._terms_of(own)
-        domes = self.travels or tuple(term.measure for term in bare if term.kind == DOMES)
+        of_springs = (term.measure for term in bare if term.kind == DOMES)
+        domes: tuple[Measure | WideMeasure, ...] = self.travels or tuple(of_springs)
         beside = np.concatenate((active[: self.n_gaps], active[self.n_gaps + self.n_travels :]))
         return LoadedPotential(
             system,

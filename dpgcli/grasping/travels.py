@@ -16,8 +16,7 @@ from dpgcli.equilibrium.beginning import NO_RATE, about_to_act
 from dpgcli.equilibrium.corrector import corrected
 from dpgcli.equilibrium.loaded import along
 from dpgcli.equilibrium.path import Ends
-from dpgcli.equilibrium.steps import AWAY
-from dpgcli.equilibrium.walk import PathEnd
+from dpgcli.equilibrium.walk import AWAY, PathEnd
 from dpgcli.grasping.contact import Obstructed
 from dpgcli.grasping.descent import finished
 from dpgcli.grasping.shapes import ContactShapes, with_lost

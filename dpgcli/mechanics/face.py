@@ -70,7 +70,7 @@ class FaceShape(NamedTuple):
         beyond = np.cumsum(of_nodes[:, ::-1], axis=1)[:, len(x) - 1 - self.first]
         is_corner, (at_x, at_y) = self.is_corner[:, None], self.origin
         way_x, way_y = np.where(is_corner, -at_y, at_x), np.where(is_corner, at_x, at_y)
-        result = beyond[0] * way_x[:, None]
+        result: Array = beyond[0] * way_x[:, None]
         result += beyond[1] * way_y[:, None]
         result += np.where(is_corner[:, None], beyond[2], 0.0)
         if self.rate is not None:
@@ -184,8 +184,9 @@ class Face:
         rows = coordinates[self.places[n_motions:]].reshape(n, -1, coordinates.shape[1])
         chord = np.zeros((1, 1)) if self.is_rigid else rows[:, 1]
         pose = pose_of(Internal(chord, rows[:, 0], rows[:, -1], chord), self.length)
-        angle, stations = np.zeros((n + 1, coordinates.shape[1])), np.zeros((2, n + 1, coordinates.shape[1]))
-        angle[1:], stations[0, 1:], stations[1, 1:] = pose.strut_angle, pose.x, pose.y
+        whole = np.zeros((3, n + 1, coordinates.shape[1]))
+        whole[0, 1:], whole[1, 1:], whole[2, 1:] = pose.x, pose.y, pose.strut_angle
+        stations, angle = whole[:2], whole[2]
         ways = self.directions
         if ways.shape[1]:
             moved = ways * coordinates[self.places[n_motions - ways.shape[1] : n_motions]]

@@ -262,7 +262,7 @@ def _followed(raw: Array) -> Indices:
     target += batch * to_next
     for _ in range((n - 1).bit_length()):  # twice as far each time
         target = np.take(target, target)
-    return target // batch % n
+    return np.asarray(target // batch % n)
 
 
 def _around_end(place: Indices, off_line: Array) -> Indices:
@@ -329,9 +329,9 @@ def bent_by(shape: FaceShape, near: Nearest, moves: Moves, force: Array) -> Arra
     if not len(cells):
         return np.zeros((len(shape.first), len(shape.first), batch))
     result = shape.bent(total(np.moveaxis(moves.push * force, 2, 0)))
-    parts = (part.reshape(-1, batch) for part in (force, near.distance, near.is_corner))
-    force, distance, is_corner = (part[cells, np.arange(batch)] for part in parts)
-    is_around = is_corner & (distance != 0.0)
+    lanes = np.arange(batch)
+    force, distance = force[cells, lanes], near.distance.reshape(-1, batch)[cells, lanes]
+    is_around = near.is_corner.reshape(-1, batch)[cells, lanes] & (distance != 0.0)
     around = np.where(is_around, force / np.where(is_around, distance, 1.0), 0.0)
     turn, slide = turns_of(shape, near, cells)
     by_side = force * slide - (0.5 * force * distance) * turn
