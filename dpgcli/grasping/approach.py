@@ -206,7 +206,8 @@ class _Journey:
     def go_on(self, obstructed: Obstructed) -> None:
         """Go on to where some lanes halt."""
         lanes, shapes = self.lanes, self.shapes
-        own, few = obstructed.take_lanes(lanes), shapes.take_lanes(lanes)
+        own = obstructed if len(lanes) == len(self.load) else obstructed.take_lanes(lanes)
+        few = shapes.take_lanes(lanes)
         fresh = np.flatnonzero(self.fresh[lanes])
         if len(fresh):
             begun = own.take_lanes(fresh)

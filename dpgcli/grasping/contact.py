@@ -89,7 +89,8 @@ class Obstructed(Layout):
         """The energy without contact: of fingers, pressures and what the body's motion costs."""
         own = self.potentials(inverted)
         if self.motion is None and self.ramp is None and len(own) == 1:
-            return own[0]
+            alone = own[0]
+            return Potential(alone.coordinates, springs_merged(alone.coordinates, alone.terms))
         terms = self._terms_of(own)
         grown = (replace(term, law=ShareOfLaw(term.law, load)) for term in self._growing_of(own))
         return Potential(self._system(own), (*terms, *grown))

@@ -1,6 +1,7 @@
 """Fingers about a growing disc: energy, limits, and what results must not depend on."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -172,6 +173,56 @@ def test_newton_meets_an_event(reference_finger: Fingers, begun: Grow, is_held: 
     assert found.is_fine and nobody[0] == -1
     assert found.load == pytest.approx(first.load, abs=1e-10)
     assert abs(family.law.margin(found.loaded, found.load)[first.cell[0], 0]) < corrector.CROSSED
+
+
+def test_what_holds_a_cell_is_part_of_its_dome(reference_finger: Fingers, begun: Grow) -> None:
+    """The derivatives are those of the potential with a spring; without a target it is at rest."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    load = np.array([0.4])
+    there = approaching.approach(obstructed, start, np.zeros(1), load)
+    shapes = obstructed.relabeled(there.shapes)
+    family, x = obstructed.family(shapes.inverted, shapes.active), obstructed.stacked(shapes)
+    x, depth = x + 1e-2 * np.sin(np.arange(len(x)))[:, None], max(family.column_depths)
+    stiffness, target = np.array([[0.0], [7.0]]), np.array([0.3])
+    whole = family.held(load, stiffness, target).evaluate(x)
+    linear = family.linearized(x, load, stiffness, target, depth)
+    assert linear.gradient == pytest.approx(whole.gradient, rel=1e-12, abs=1e-12)
+    assert linear.hessian == pytest.approx(whole.hessian, rel=1e-12, abs=1e-12)
+    assert family.take_lanes(np.zeros(1, int)).linearized(
+        x, load, stiffness, target, depth
+    ).hessian == pytest.approx(linear.hessian, rel=1e-15), "its lanes share the dome, too"
+    bare = family.at(load).evaluate(x).gradient
+    at_rest = family.linearized(x, load, stiffness, np.array([np.nan]), depth)
+    assert at_rest.gradient == pytest.approx(bare, rel=1e-12, abs=1e-12)
+
+
+def test_events_are_met_by_squares(
+    reference_finger: Fingers, begun: Grow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Newton's own steps from well before a contact: each as the square of the one before."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    part = np.array([0.2])
+    half = approaching.approach(obstructed, start, np.zeros(1), part)
+    shapes = obstructed.relabeled(half.shapes)
+    family, x = obstructed.family(shapes.inverted, shapes.active), obstructed.stacked(shapes)
+    first = path.follow(family, x, part, np.array([1.0]))
+    lengths: list[float] = []
+    look = corrector._look
+
+    def told(*args: Any) -> Any:
+        found = look(*args)
+        lengths.append(float(found.length[0]))
+        return found
+
+    monkeypatch.setattr(corrector, "_look", told)
+    ways = corrector.Ways(np.zeros(1, bool), first.cell)
+    near, guess = 0.9 * first.load, first.coordinates + 0.01 * np.sin(np.arange(len(x)))[:, None]
+    target = family.followed(guess).value[:1, 0] + 0.5  # mm: nothing of it is left
+    args = near, np.array([0]), target, max(family.column_depths), ways
+    assert corrector.corrected(family, guess, *args).is_fine
+    assert lengths[0] > 1e-3, "of the step cap: a way to go"
+    squares = [b / a**2 for a, b in pairwise(lengths) if b > 1e-10]
+    assert squares and max(squares) < 30.0, lengths
 
 
 def test_it_can_stop_halfway(reference_finger: Fingers, begun: Grow) -> None:
