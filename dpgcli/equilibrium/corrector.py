@@ -17,7 +17,7 @@ from dpgcli.equilibrium.loaded import Linearized, LoadedLaw, LoadedPotential, al
 
 TOLERANCE = 1e-12  # of the forces in play, and of a cell's scale
 SETTLED_STEP = 1e-5  # of the step cap: what is left to go
-LAST_STEP, ROUGH_STEP = 1e-7, 1e-3  # of the step cap: Newton squares it; to points that are rough
+LAST_STEP = 1e-7  # of the step cap: Newton squares it, and what is left is rounding
 CROSSED = 1e-11  # of what margins are measured by: as near Newton comes to an event
 STRAYING, SHRINKING = 0.05, 0.25  # of the step cap; of a step: what guesses are good for
 ASTRAY, GROWING = 1e-2, 0.8  # of the step cap: longer steps have to shrink to so much each
@@ -121,7 +121,8 @@ def corrected(
             far = np.where(is_far, look.length / before / SHRINKING, 0.0)
             astray[lanes] = np.maximum(astray[lanes], far)
         is_there = look.is_there & ((count > 0) | (ways is None))
-        is_near = look.length <= np.where(here.is_rough, ROUGH_STEP, LAST_STEP)
+        is_near = np.where(here.is_rough, look.length <= SETTLED_STEP, look.length <= LAST_STEP)
+        is_near &= here.is_rough | (count > 0)
         is_lost = np.full(len(lanes), count == MAX_CORRECTIONS)
         if ways is not None:
             is_lost |= ~(look.length <= np.maximum(GROWING * before, ASTRAY))

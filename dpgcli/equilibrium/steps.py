@@ -106,7 +106,7 @@ def one_step(
     longer = np.fmin(longer, step * nearer)
     walk.step = np.where(accepted, longer, shorter)
     by_load = ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK)
-    by_load &= may_kink(family, len(end))
+    by_load &= may_kink(family, len(end)) & ~is_unforeseen
     if by_load.any():
         go_by_load(walk, by_load)
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
