@@ -70,12 +70,10 @@ def one_step(
     """
     ending = np.full(len(end), -1)
     to_fold = distance_to_fold(walk.slope, walk.last_slope, walk.last)
-    is_before = (end - walk.load) * towards > 0.0  # a step by a cell may have led beyond
-    is_fold = (walk.cell >= 0) & (to_fold <= FOLD_DISTANCE) & is_before
+    is_fold = _have_folded(walk, to_fold, (end - walk.load) * towards)
     if is_fold.any():
         land(walk, is_fold, to_fold, towards)
-        ending[is_fold] = PathEnd.FOLD
-        return ending
+        return np.where(is_fold, PathEnd.FOLD, -1)
     walk.step = np.where(walk.cell >= 0, np.minimum(walk.step, largest_step), walk.step)
     step = np.minimum(walk.step, np.maximum(CLOSER * to_fold, FOLD_DISTANCE / 4.0))
     usual, step = step, _to_foreseen(family, walk, step)
@@ -102,13 +100,10 @@ def one_step(
     ending[is_stuck] = np.where(walk.cell[is_stuck] >= 0, PathEnd.FOLD, PathEnd.FAILED)
     is_within = (trial.there.load - end) * towards <= 0.0  # what is met beyond the end is not met
     landed = (accepted & ~is_last & is_within & meets.any(axis=0)) | (is_stuck & is_event)
-    longer = np.minimum(GROWTH * np.maximum(step, walk.step), largest_step)
-    longer = np.fmin(longer, step * nearer)
-    walk.step = np.where(accepted, longer, shorter)
-    by_load = ~trial.is_fine & (ending < 0) & (walk.cell >= 0) & (shorter < KINK)
-    by_load &= may_kink(family, len(end)) & ~is_unforeseen
-    if by_load.any():
-        go_by_load(walk, by_load)
+    walk.step = np.where(accepted, _longer(walk, step, step * nearer, largest_step), shorter)
+    by_load = ~trial.is_fine & ~is_unforeseen & (ending < 0) & (walk.cell >= 0) & (shorter < KINK)
+    if (by_load & may_kink(family, len(end))).any():
+        go_by_load(walk, by_load & may_kink(family, len(end)))
     event_cell = np.where(is_event, crossed, np.where(meets, np.abs(margin), np.inf)).argmin(axis=0)
     walk.meeting = _to_meet(family, walk, trial, np.where(is_event, event_cell, -1), is_away)
     walk.is_beyond = is_event
@@ -116,13 +111,21 @@ def one_step(
     if accepted.any():
         _move(family, walk, trial, accepted, towards)
     if event is not None:
-        moved = accepted & landed
-        walk.coordinates = np.where(moved, event.coordinates, walk.coordinates)
-        walk.load = np.where(moved, event.load, walk.load)
+        _put_at(walk, event, accepted & landed)
         walk.cell = np.where(landed, event_cell, walk.cell)
         ending[landed] = PathEnd.EVENT
     ending[accepted & is_last] = PathEnd.ARRIVED
     return ending
+
+
+def _have_folded(walk: Walk, to_fold: Array, left: Array) -> Flags:
+    """Which are at their folds; not those that a step by a cell has led beyond the end."""
+    return (walk.cell >= 0) & (to_fold <= FOLD_DISTANCE) & (left > 0.0)
+
+
+def _longer(walk: Walk, step: Array, by_guess: Array, largest_step: float) -> Array:
+    """Steps after those that were taken: as long as guesses are good, and the largest."""
+    return np.fmin(np.minimum(GROWTH * np.maximum(step, walk.step), largest_step), by_guess)
 
 
 def _to_foreseen(family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, step: Array) -> Array:
@@ -277,6 +280,11 @@ class _Place(NamedTuple):
 
     coordinates: Array
     load: Array
+
+
+def _put_at(walk: Walk, place: _Place, which: Flags) -> None:
+    walk.coordinates = np.where(which, place.coordinates, walk.coordinates)
+    walk.load = np.where(which, place.load, walk.load)
 
 
 def _at_event(

@@ -7,10 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dpgcli.api.inputs import scene_input
 from dpgcli.arrays import Array
 from dpgcli.equilibrium import corrector, path, steps, walk
 from dpgcli.grasping import approach as approaching
+from dpgcli.grasping.descent import finished
+from dpgcli.grasping.frames import frames
+from dpgcli.grasping.grasp import placed
 from dpgcli.mechanics.finger import Finger
+from dpgcli.mechanics.terms import chain_potential
+from dpgcli.states.patterns import inverted_units
+from dpgcli.states.settle import settle
 
 Fingers = Callable[..., Finger]
 Grow = Callable[..., Any]
@@ -275,3 +282,69 @@ def test_stiff_bars_come_to_rigid_ones(reference_finger: Fingers, grown: Grow) -
     off = [abs(push(bars) - rigid) / rigid for bars in (1e5, 1e6, 1e12, 1e15)]
     assert off[0] / off[1] == pytest.approx(10.0, rel=0.01)
     assert off[2] < 1e-9 and off[3] < 1e-11
+
+
+def test_a_contact_ahead_is_gone_to_at_once(
+    reference_finger: Fingers, begun: Grow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A finger that nothing touches yet is where it touches after a single step."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    family = obstructed.family(start.inverted, start.active)
+    taken: list[int] = []
+    one_step = path.one_step
+
+    def told(*args: Any) -> Any:
+        taken.append(1)
+        return one_step(*args)
+
+    monkeypatch.setattr(path, "one_step", told)
+    first = path.follow(family, obstructed.stacked(start), np.zeros(1), np.ones(1))
+    assert first.outcome[0] == walk.PathEnd.EVENT and len(taken) == 1
+    here = family.measure(first.coordinates)
+    assert abs(family.law.margin(here, first.load)[first.cell[0], 0]) < corrector.CROSSED
+
+
+def test_contacts_that_only_seem_to_be_ahead_do_no_harm(
+    reference_finger: Fingers, begun: Grow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Resets and rest are the same where every step is told of a contact that is not there."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    args = obstructed, start, np.zeros(1), np.ones(1)
+    right = approaching.approach(*args)
+    told: list[int] = []
+
+    def wrong(here: walk.Walk) -> Array:
+        told.append(1)
+        return np.where(np.isfinite(here.margin), 1e-3, np.inf)
+
+    monkeypatch.setattr(steps, "to_events_ahead", wrong)
+    found = approaching.approach(*args)
+    assert told and len(right.resets) == len(found.resets) > 0
+    for reset, same in zip(right.resets, found.resets, strict=True):
+        assert same.flipped.tolist() == reset.flipped.tolist()
+        assert same.load == pytest.approx(reset.load, abs=1e-11)
+    assert found.shapes.coordinates == pytest.approx(right.shapes.coordinates, abs=1e-11)
+
+
+def test_a_fold_where_a_contact_leaves_a_plate_is_found_exactly() -> None:
+    """Jaws whose corner the end of a finger comes to: there the load turns back at a kink."""
+    geometry = {"dome_height_mm": 6.054437, "dome_thickness_mm": 0.6857928, "unit_cell_mm": 22}
+    geometry |= {"chamber_length_mm": 9, "channel_width_mm": 10, "elastic_modulus_MPa": 26}
+    geometry |= {"limiting_layer_thickness_mm": 1.5, "unit_separation_mm": 3}
+    finger = {"units": 4, "calibration": "published", "geometry": geometry}
+    spec = {
+        "finger": finger | {"linear_stiffness_N_per_mm": 1000},
+        "gripper": {"base_spacing_mm": 37.588216, "mounting_angle_deg": -3.63988},
+        "object": {"jaws": {"gap_mm": 21.777865, "height_mm": 19.82339}, "at_mm": [50.854096, 0]},
+    }
+    scene = scene_input(spec).scene
+    assert scene.body is not None
+    codes = np.array([0b1110], np.uint64)
+    part = placed(scene, chain_potential, scene.body, frames(scene.gripper)[0], codes)
+    load, own = part.grown.resets[0].load, part.own
+    pattern = inverted_units(codes, 4)
+    x = settle(own.units, chain_potential, pattern, 1e-12).equilibrium.coordinates
+    start = finished(own, x, pattern, np.zeros((len(own.are_kept), 1)), np.zeros(1))
+    for share, n_resets in ((1.0 - 1e-7, 0), (1.0 + 1e-7, 1)):
+        came = approaching.approach(own, start, np.zeros(1), share * load)
+        assert len(came.resets) == n_resets, share
