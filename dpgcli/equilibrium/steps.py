@@ -134,7 +134,7 @@ def _to_foreseen(family: LoadedPotential[Coordinates, LoadedLaw], walk: Walk, st
         return step
     ahead = to_events_ahead(walk)
     first = ahead.min(axis=0)
-    is_foreseen = (walk.meeting == -1) & (first <= step)
+    is_foreseen = (walk.meeting == -1) & np.isfinite(first) & (first <= step)
     walk.meeting = np.where(is_foreseen, ahead.argmin(axis=0), walk.meeting)
     return np.where(is_foreseen, first, step)
 

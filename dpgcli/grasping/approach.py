@@ -26,6 +26,7 @@ SKIPPED, OVER_KINK = 1e-6, 1e-4  # of the way: beyond a fold; over a kink that n
 MOST_HALTS = 40  # by unit
 MOST_KINKS, KINK_ROOM = 8, 1e-3  # kinks one after the other: of the way between two of them
 MOST_NEAR = 10  # halts, by unit, as near to each other: contacts that close and open on end
+JUMPED = 1e-3  # of a stroke: what is closer has not jumped
 MOST_CHANGES, OUT_OF_ORDER = 8, 1e-12  # of contacts in the end; of a stroke
 LOOKS, STAGES = 256, 8  # places on a way at which contacts are looked for: before one, and after
 
@@ -355,10 +356,17 @@ def _put_right(obstructed: Obstructed, shapes: ContactShapes, load: Array) -> No
 
 
 def _told(own: Obstructed, before: ContactShapes, ends: Ends) -> Ends:
-    """The ends of paths: where a gap closes that is another one's it has jumped, as at a kink."""
-    place = own.gaps()(ends.coordinates[: len(before.coordinates)]).place
+    """The ends of paths: gaps that close while they are another one's, or wide, have jumped.
+
+    As at a kink. No contact is to be made of a wide one: a body that has gone past a finger's end
+    is all at once behind the finger.
+    """
+    coordinates = ends.coordinates[: len(before.coordinates)]
+    measured, bound = own.gaps()(coordinates), own.bound(ends.load)
     cell, lanes = np.maximum(ends.cell, 0), np.arange(len(ends.cell))
-    is_jump = ~before.active[cell, lanes] & (place[cell, lanes] != cell)
+    is_wide = np.abs(measured.value - bound)[cell, lanes] > JUMPED * own.large[0]
+    is_wide &= cell < own.n_gaps
+    is_jump = ~before.active[cell, lanes] & (is_wide | (measured.place[cell, lanes] != cell))
     is_jump &= ends.outcome == PathEnd.EVENT
     ends = replace(ends, outcome=np.where(is_jump, PathEnd.FAILED, ends.outcome))
     return with_lost_domes(own, before, ends)

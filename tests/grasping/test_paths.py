@@ -1,6 +1,7 @@
 """Fingers about a growing disc: energy, limits, and what results must not depend on."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -324,6 +325,18 @@ def test_contacts_that_only_seem_to_be_ahead_do_no_harm(
         assert same.flipped.tolist() == reset.flipped.tolist()
         assert same.load == pytest.approx(reset.load, abs=1e-11)
     assert found.shapes.coordinates == pytest.approx(right.shapes.coordinates, abs=1e-11)
+
+
+def test_a_gap_that_jumps_shut_from_afar_is_no_contact(
+    reference_finger: Fingers, begun: Grow
+) -> None:
+    """Nothing brings a finger over to there; where it has come to a contact this closes."""
+    obstructed, start = begun(reference_finger(2), *RESETS)
+    family, x = obstructed.family(start.inverted, start.active), obstructed.stacked(start)
+    first = path.follow(family, x, np.zeros(1), np.ones(1))
+    wide = replace(first, load=first.load - 0.1)  # the body is as far away as it had to grow
+    told = [int(approaching._told(obstructed, start, ends).outcome[0]) for ends in (first, wide)]
+    assert told == [walk.PathEnd.EVENT, walk.PathEnd.FAILED]
 
 
 def test_a_fold_where_a_contact_leaves_a_plate_is_found_exactly() -> None:
