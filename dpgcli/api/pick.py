@@ -25,6 +25,7 @@ from dpgcli.records import dataclass
 from dpgcli.states.columns import Column
 from dpgcli.sweeps.choice import Question, check_undoubted, question, selected, warnings_of
 from dpgcli.sweeps.gate import counts_of
+from dpgcli.sweeps.metrics import METRICS
 from dpgcli.text import counted, printable
 
 KEPT = ("dpg.schema_version", "dpg.law", "dpg.versions", "dpg.base", "dpg.trust", "dpg.warnings")
@@ -38,11 +39,13 @@ class PickResult(TableResult):
     """The rows that were chosen, in their order; `lines` say what became of the others.
 
     `warnings` name the columns that nothing should be chosen by, as far as the table says it;
-    `first` is the design of the first row.
+    `first` is the design of the first row. `counts` say where searches failed, so that columns are
+    only bounds: files have them, too.
     """
 
     columns: tuple[Column, ...]
     rows: Columns
+    counts: Columns
     lines: tuple[str, ...]
     warnings: tuple[str, ...]
     metadata: dict[str, str]
@@ -62,8 +65,9 @@ class PickResult(TableResult):
         """
         table = table_path(path)
         check_outputs(self.sources, (table, Mark.TABLE))
-        described = with_bases(schema(self.columns), self.metadata)
-        write_table(table, described, [record_batch(self.columns, self.rows)], self.metadata)
+        columns = (*self.columns, *(m for m in METRICS if m.name in self.counts))
+        described, rows = with_bases(schema(columns), self.metadata), self.rows | self.counts
+        write_table(table, described, [record_batch(columns, rows)], self.metadata)
 
     def save_spec(self, path: str | Path) -> None:
         """Write the spec of the first row's design, complete in one file.
@@ -173,9 +177,13 @@ def _picked(
     if strict:
         check_undoubted(source.trusts, warnings)
     rows = source.rows(found.places, shown)
+    hidden = [name for name in counts_of(shown, source.numbers) if name not in shown]
+    counts = source.rows(found.places, hidden) if hidden else {}
     metadata = _metadata(source, asked, shown)
     design = source.design(int(found.places[0]))
-    return PickResult(source.described(rows), rows, lines, warnings, metadata, files, design)
+    return PickResult(
+        source.described(rows), rows, counts, lines, warnings, metadata, files, design
+    )
 
 
 def _usable(source: RowSource, columns: Columns) -> tuple[Flags, str]:

@@ -28,6 +28,7 @@ from dpgcli.files.table_reader import (
     check_kinds,
     check_names,
     column_of,
+    counts_in,
     is_number,
     is_text,
     trusts_of,
@@ -214,6 +215,7 @@ def _checked(source: RowSource) -> RowSource:
         raise UsageError(f"{name} is a table of states: choose among them with ", STATES)
     check_names(name, schema, f"{source.what}s", source.needed)
     check_kinds(name, schema, dict.fromkeys(source.swept, NUMBERS) | source.needed)
+    check_kinds(name, schema, counts_in(schema))
     return source
 
 

@@ -33,6 +33,7 @@ NEEDED = {
     "reason": TEXT,
     "n_stable": WHOLE,
 }
+COUNTS = {metric.unknown for metric in METRICS if metric.unknown}
 OTHERS = {*NEEDED, *TEXTS, "error_bound_mm", *(metric.name for metric in METRICS)}  # not swept
 MOST_FACTS = 2**26  # bytes
 DAMAGED = (
@@ -195,6 +196,7 @@ def _readable(source: str, described: Any) -> list[str]:
     check_names(source, described, "designs", NEEDED)
     swept = swept_in(described)
     check_kinds(source, described, dict.fromkeys(swept, NUMBERS) | NEEDED)
+    check_kinds(source, described, counts_in(described))
     names = _in_our_order(described.names, swept)
     return [name for name in names if _may_hold(described.field(name).type, _kind(name))]
 
@@ -209,6 +211,11 @@ def check_names(source: str, described: Any, what: str, needed: Iterable[str]) -
         )
     if twice := sorted(name for name, count in counts.items() if count > 1):
         raise UsageError(f"{source}: expected each column once, found {', '.join(twice)} again")
+
+
+def counts_in(described: Any) -> dict[str, str]:
+    """Columns that count failed searches, and what they hold: others are only bounds by them."""
+    return {name: NUMBERS for name in described.names if name in COUNTS}
 
 
 def check_kinds(source: str, described: Any, kinds: Mapping[str, str]) -> None:

@@ -10,7 +10,7 @@ from dpgcli.arrays import Columns, Flags, Indices
 from dpgcli.design.outputs import Trust, doubts_about
 from dpgcli.errors import Field, Message, NothingSelectedError, UsageError
 from dpgcli.records import dataclass
-from dpgcli.sweeps.comparisons import ends_tell
+from dpgcli.sweeps.comparisons import conjuncts, ends_tell
 from dpgcli.sweeps.expressions import Expression, ExpressionError, expression
 from dpgcli.sweeps.metrics import (
     METRICS,
@@ -190,6 +190,12 @@ def holds(rule: Expression, columns: Columns) -> Flags:
     Where searches failed it holds for all that may be there: if both ends of that do not tell, it
     does not hold.
     """
+    parts = [_part_holds(part, columns) for part in conjuncts(rule)]
+    return np.asarray(np.logical_and.reduce(parts))
+
+
+def _part_holds(rule: Expression, columns: Columns) -> Flags:
+    """The same of what no `and` joins, at all ends of what is not known."""
     values = {name: columns[name] for name in rule.names}
     met = have_values(columns, rule.names)
     bounds = _bounds(columns, rule.names)
@@ -221,9 +227,13 @@ def counts_of(names: Iterable[str], columns: Container[str]) -> list[str]:
 
 
 def _bounds(columns: Columns, names: Collection[str]) -> list[tuple[Metric, Flags]]:
-    """Metrics among columns that are bounds where searches failed, and in which rows."""
+    """Metrics among columns that are bounds where searches failed, and in which rows.
+
+    Where a count has no value it is not known whether they did.
+    """
     told = [BOUNDS[name] for name in sorted(names) if name in BOUNDS]
-    found = [(metric, columns[metric.unknown] > 0) for metric in told if metric.unknown in columns]
+    known = [metric for metric in told if metric.unknown in columns]
+    found = [(metric, ~(columns[metric.unknown] == 0)) for metric in known]
     return [(metric, is_open) for metric, is_open in found if is_open.any()]
 
 
@@ -276,9 +286,14 @@ def failed_searches_of(
 def failed_searches(columns: Columns, names: Collection[str]) -> list[str]:
     """What is not known of columns with these names, where searches failed: in lines."""
     found = {metric.unknown: int(is_open.sum()) for metric, is_open in _bounds(columns, names)}
+    counts = dict.fromkeys(BOUNDS[name].unknown for name in sorted(names) if name in BOUNDS)
     return [
         f"searches failed or did not decide in {counted(n, 'design')} ({name}): {MEANINGS[name]}"
         for name, n in found.items()
+    ] + [
+        f"whether searches failed is not known: the table has no column {name}"
+        for name in counts
+        if name not in columns
     ]
 
 

@@ -8,9 +8,11 @@ import pytest
 from dpgcli.arrays import Columns
 from dpgcli.errors import NothingSelectedError, UsageError
 from dpgcli.sweeps.comparisons import ends_tell
+from dpgcli.sweeps.expressions import Expression
 from dpgcli.sweeps.gate import (
     check_requirements,
     failing,
+    holds,
     number_columns,
     requirement,
     swept_names,
@@ -200,6 +202,40 @@ def test_a_rule_that_holds_at_both_ends_holds_between(text: str) -> None:
 def test_a_comparison_of_no_column_is_none() -> None:
     with pytest.raises(UsageError, match=r"'1 < 2': expected a comparison of columns, found none"):
         requirement("1 < 2", COLUMNS)
+
+
+@pytest.mark.parametrize("count", [np.nan, -1.0, np.inf])
+def test_a_count_that_is_none_is_not_known(count: float) -> None:
+    """As a join of tables leaves it: that row may have states that nobody has found."""
+    designs = SEARCHED | {"n_unknown_states": np.array([0.0, count, 0.0])}
+    rule = requirement("reach_max_mm < 20 and n_stable <= 8", number_columns(SEARCHED))
+    (verdict,) = check_requirements(designs, [rule])
+    assert verdict.rows.tolist() == [1]
+    assert "searches failed or did not decide in 1 design" in str(verdict.warnings[0])
+
+
+def test_a_table_without_a_count_is_warned_of() -> None:
+    rule = requirement("reach_max_mm < 20", number_columns(SEARCHED))
+    some = {name: values for name, values in SEARCHED.items() if name != "n_unknown_states"}
+    (verdict,) = check_requirements(some, [rule])
+    (warning,) = map(str, verdict.warnings)
+    assert verdict.is_met
+    assert warning.endswith("not known: the table has no column n_unknown_states")
+
+
+def test_joined_comparisons_take_no_more_than_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All ends of all of them at once would be two to the power of their number."""
+    bounds = ["reach_max_mm < 20", "n_grasps < 9", "squeeze_max_N < 9", "contact_max_N < 9"]
+    rule = requirement(" and ".join([*bounds, "n_reachable < 9"]), number_columns(SEARCHED))
+    looks, evaluated = [], Expression.__call__
+
+    def counted(own: Expression, values: Columns) -> object:
+        looks.append(own.text)
+        return evaluated(own, values)
+
+    monkeypatch.setattr(Expression, "__call__", counted)
+    assert not holds(rule, SEARCHED).any()
+    assert len(looks) <= 4 * len(bounds) + 4
 
 
 def test_failed_searches_are_warned_of_and_shown() -> None:
