@@ -50,6 +50,7 @@ def space(**changes: Any) -> pd.DataFrame:
         ],
         "n_states": np.where(valid, 8, 0),
         "n_stable": np.where(valid, 8, 0),
+        "n_unknown_states": np.zeros(8, int),
         "n_distinct_tips": np.where(valid, 8, 0),
         "workspace_area_mm2": np.where(valid, (height - gap) * 123.456789, nan),
         "max_residual_N": np.where(valid, height * 1e-14, nan),
