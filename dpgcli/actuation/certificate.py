@@ -3,6 +3,7 @@
 from dpgcli.actuation.pressed import LARGEST_RESIDUAL, Pressed, Shapes
 from dpgcli.actuation.readings import Readings
 from dpgcli.actuation.rest import at_rest, is_same
+from dpgcli.mechanics.finger import Finger
 from dpgcli.records import dataclass
 from dpgcli.states.certify import MARGINAL_CURVATURE, Status
 from dpgcli.states.solved import ALONE
@@ -45,7 +46,7 @@ def certificate(pressed: Pressed, shapes: Shapes) -> Certificate:
         status = Status(settled.status[0])
         is_that = bool(is_same(pressed, shapes, state)[0])
         is_sound = is_sound and is_that and status is Status.STABLE
-        text = _at_rest(status, is_that=is_that)
+        text = _at_rest(status, pressed.finger, is_that=is_that)
     return Certificate(is_sound, text, residual, pivot)
 
 
@@ -57,9 +58,9 @@ def _under_pressure(is_balanced: bool, pivot: float) -> str:
     return "certified: a stable equilibrium under its pressures"
 
 
-def _at_rest(status: Status, *, is_that: bool) -> str:
+def _at_rest(status: Status, finger: Finger, *, is_that: bool) -> str:
     if status is not Status.STABLE:
-        return f"not certified: {status.text}, {status.meaning}"
+        return f"not certified: {status.text}, {status.meaning_for(finger)}"
     if not is_that:
         return "not certified: another shape than the stable state of its pattern"
     return "certified: the stable state of its pattern"

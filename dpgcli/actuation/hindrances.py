@@ -9,6 +9,7 @@ from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.rest import at_rest
 from dpgcli.actuation.sequences import PulseSequence
 from dpgcli.arrays import Indices
+from dpgcli.mechanics.finger import Finger
 from dpgcli.states.certify import Status
 from dpgcli.states.patterns import inverted_units
 from dpgcli.text import counted
@@ -24,7 +25,7 @@ def hindrances(
     inverted = inverted_units(np.array([found.target], np.uint64), n_units)
     status = Status(at_rest(pressed, inverted)[1].status[0])
     if status is not Status.STABLE:
-        yield f"{found.target:0{n_units}b} is no stable state: {status.text}, {status.meaning}"
+        yield _no_state(f"{found.target:0{n_units}b}", status, pressed.finger)
         return
     pairs = obstacles(found.alone, line_of, inverted[:, 0])
     if found.graph.n_lost:
@@ -42,6 +43,14 @@ def hindrances(
     yield from (_statement(found, pair) for pair in pairs[:MOST_NAMED])
     if len(pairs) > MOST_NAMED:
         yield f"and {counted(len(pairs) - MOST_NAMED, 'pair')} of units more"
+
+
+def _no_state(pattern: str, status: Status, finger: Finger) -> str:
+    """That a pattern has no stable state, or that none is found, which proves nothing."""
+    why = f"{status.text}, {status.meaning_for(finger)}"
+    if status is Status.NOT_CONVERGED:
+        return f"no stable state of {pattern} is found: {why}"
+    return f"{pattern} is no stable state: {why}"
 
 
 def _statement(found: PulseSequence, pair: Obstacle) -> str:

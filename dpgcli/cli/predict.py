@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from dpgcli.arrays import Columns
     from dpgcli.design.scene import Scene
     from dpgcli.states.accuracy import AccuracyLevel
+    from dpgcli.states.certify import Status
+    from dpgcli.states.plan import Plan
     from dpgcli.states.predict import Prediction, Summary
 
 BRAILLE = "\u28ff"
@@ -187,6 +189,16 @@ def _check_outputs(sources: Sequence[Path], output: Path | None, plot: Path | No
         check_facts(output)
 
 
+def _meaning(status: "Status", plan: "Plan") -> str:
+    """What a status means for a finger, and what may help where bars are in the way."""
+    from dpgcli.states.certify import Status
+
+    meaning = status.meaning_for(plan.scene.finger)
+    if status is Status.NOT_CONVERGED and plan.request.formulation == "lattice":
+        return f"{meaning} (node coordinates with very stiff bars: take the chain)"
+    return meaning
+
+
 def _summary(prediction: "Prediction") -> Iterator[str]:
     """States, error and time in one line, why some are not stable, and where values come from."""
     from dpgcli.states.certify import Status
@@ -203,7 +215,7 @@ def _summary(prediction: "Prediction") -> Iterator[str]:
     yield f"{counts} in {summary.seconds:.3g} s ({_rate(summary)}); {worst}"
     for status, n in summary.statuses.items():
         if n and status is not Status.STABLE:
-            yield f"{status.text}: {status.meaning}"
+            yield f"{status.text}: {_meaning(status, plan)}"
     origins = Counter(source.origin.value for source in plan.scene.sources)
     values = ", ".join(f"{n} {origin}" for origin, n in origins.items())
     yield f"values: {values} (dpg explain says which); {plan.scene.finger.law.description}"

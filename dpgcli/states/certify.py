@@ -47,6 +47,11 @@ class Status(IntEnum):
         """The sentence in summaries."""
         return _MEANINGS[self]
 
+    def meaning_for(self, finger: Finger) -> str:
+        """The sentence for a finger, whose loads may be the reason as well."""
+        is_by_way = self is Status.NOT_CONVERGED and finger.is_loaded
+        return f"{self.meaning}; or {_LOST}" if is_by_way else self.meaning
+
 
 _MEANINGS = {
     Status.STABLE: "certified: residual, curvature, wells and shape",
@@ -61,8 +66,9 @@ _MEANINGS = {
     Status.BEYOND_TABLE: "jaws would rest at an aperture beyond those of their table of forces",
     Status.FOLDED: "a minimum of the equations whose shape no finger can take",
     Status.NOT_CONVERGED: "the residual is above its tolerance, or not small against what a unit "
-    "bears before it leaves its well (node coordinates with very stiff bars: take the chain)",
+    "bears before it leaves its well",
 }
+_LOST = "the state is lost, or folds onto itself, as loads grow"
 
 
 @dataclass(frozen=True)
@@ -104,9 +110,8 @@ def certified(
     """
     coordinates = potential.coordinates
     extension, is_folded, lever = coordinates.springs(equilibrium.coordinates)
-    # a dome that does not act is not inverted by its neighbors
     wells = units.wells
-    reached = (extension > wells.spring_barrier) & (coordinates.finger.acting > 0.0)
+    reached = are_inverted(coordinates.finger, extension, wells)
     strayed = reached & ((extension < wells.from_top) | (extension > wells.to_top))
     loop = units.shortest_loop
     if loop is not None:
@@ -118,6 +123,14 @@ def certified(
         potential, equilibrium, inverted, reached, strayed, is_folded, is_balanced, unknown
     )
     return replace(settled, status=certify(settled, units, tolerance, own))
+
+
+def are_inverted(finger: Finger, extension: Array, wells: Wells) -> Flags:
+    """Units open beyond the tops of their domes, (unit, batch), by extensions in mm.
+
+    A dome that does not act is not inverted by its neighbors, or by loads.
+    """
+    return np.asarray((extension > wells.spring_barrier) & (finger.acting > 0.0))
 
 
 def certify(

@@ -13,6 +13,7 @@ from dpgcli.equilibrium.walk import PathEnd
 from dpgcli.mechanics.coordinates import FingerCoordinates
 from dpgcli.mechanics.terms import LOAD, Formulate
 from dpgcli.records import dataclass
+from dpgcli.states.certify import are_inverted
 from dpgcli.states.units import UnitSolutions
 
 SHORT_STEP = 0.25  # of a step, where curves bend often: no fold is stepped over
@@ -28,9 +29,11 @@ class Grown:
 
     Coordinates (size, batch); which lanes `arrived`, (batch,). At the first fold on the way a unit
     loses its place: its `unit`, −1 where all are kept, and the `share` of the load, NaN there.
+    `inverted` says which units are so beyond the last fold, (unit, batch): their domes go on.
     """
 
     coordinates: Array
+    inverted: Flags
     arrived: Flags
     unit: Indices
     share: Array
@@ -40,7 +43,8 @@ def grown(units: UnitSolutions, formulate: Formulate, inverted: Flags, start: Ar
     """Follow unloaded states of patterns, (unit, batch), while their loads grow from nothing.
 
     `start` has their coordinates, (size, batch). Where a unit loses its place the finger goes
-    downhill under that share of the load to its next minimum, and on from there.
+    downhill under that share of the load to its next minimum, and on from there. A dome that only
+    pushes and has reset does not act any more, however far loads open its gap.
 
     >>> from dpgcli.mechanics.finger import STUDY, uniform_finger
     >>> from dpgcli.mechanics.terms import chain_potential
@@ -74,12 +78,14 @@ def grown(units: UnitSolutions, formulate: Formulate, inverted: Flags, start: Ar
         share[lanes] = np.where(is_first, load[lanes], share[lanes])
         here[:, lanes] = _downhill(family.take_lanes(np.flatnonzero(folds)), ends, folds)
         load[lanes] *= 1.0 + BEYOND
-        springs = family.coordinates.take_lanes(np.flatnonzero(folds)).springs(here[:, lanes])
-        now[:, lanes] = springs.extension > units.take_lanes(lanes).wells.spring_barrier
+        fallen = family.coordinates.take_lanes(np.flatnonzero(folds))
+        springs = fallen.springs(here[:, lanes])
+        wells = units.take_lanes(lanes).wells
+        now[:, lanes] = are_inverted(fallen.finger, springs.extension, wells)
         lanes = lanes[~springs.is_folded]  # no finger takes such a shape, now or later
         if not len(lanes):
             break
-    return Grown(here, arrived, unit, share)
+    return Grown(here, now, arrived, unit, share)
 
 
 def _family(

@@ -143,6 +143,7 @@ def _under_load(
     Where openings grow in proportion to the loads Newton's method does; all else is followed, since
     it might step over a fold, or onto another branch. What is lost on the way, as a finger that
     folds onto itself, has no answer. What has no unloaded state is looked for under the full loads.
+    The domes that act in the end are those that a way ends with.
     """
     bare = replace(units, finger=units.finger.unloaded)
     begun = settle(bare, formulate, inverted, tolerance, own=own)
@@ -163,10 +164,13 @@ def _under_load(
 
     few, begins = units.take_lanes(lanes), np.take(inverted, lanes, axis=1)
     way = grown(few, formulate, begins, begun.equilibrium.coordinates[:, lanes])
-    potential = formulate(few.finger.with_domes(begins))
+    potential = formulate(few.finger.with_domes(way.inverted))
     again = settle_from(few, potential, begins, way.coordinates, tolerance, own)
     found = settled.equilibrium.with_lanes(lanes, again.equilibrium, np.arange(len(lanes)))
-    settled = certified(units, settled.potential, inverted, found, tolerance, own)
+    domes = inverted.copy()
+    domes[:, lanes] = way.inverted
+    ended = formulate(units.finger.with_domes(domes))
+    settled = certified(units, ended, inverted, found, tolerance, own)
     status = settled.status.copy()
     status[lanes[~way.arrived]] = Status.NOT_CONVERGED  # elsewhere than loads lead to, if anywhere
     return replace(settled, status=status)

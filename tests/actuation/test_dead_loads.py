@@ -106,3 +106,12 @@ def test_beyond_buckling_it_is_not_known_where_the_finger_rests(
     assert rows["n_unknown_states"].tolist() == [n_unknown]
     assert rows["n_unknown_directions"].tolist() == [n_unknown]
     assert [verdict.is_met for verdict in result.verdicts] == [n_unknown == 0] * 3
+
+
+def test_what_loads_lead_nowhere_is_not_said_to_be_no_state() -> None:
+    """Under this force 10 folds onto itself on the way, and the chain has no stiff bars to mind."""
+    settings = ("finger.units=2", "loads.tip_force_x_N=-6.5", "pressure.lines={A: 1-2}")
+    reason = dpg.pulses(SPEC.with_name("eight_unit.yaml"), end="10", settings=settings).reasons[0]
+    assert reason.startswith("no stable state of 10 is found: not_converged, ")
+    assert reason.endswith("; or the state is lost, or folds onto itself, as loads grow")
+    assert "node coordinates" not in reason

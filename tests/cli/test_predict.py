@@ -17,6 +17,7 @@ import pytest
 from dpgcli.cli.exits import ExitCode
 
 Call = Callable[..., Any]
+FINE = ("--formulation", "lattice", "--tolerance", "1e-14")
 FIRST = [
     "pattern",
     "status",
@@ -144,6 +145,23 @@ def test_a_pattern_without_a_state_says_why(call: Call) -> None:
     assert "marginal: " not in table.stderr
     alone = call("predict", "three_unit.yaml", *ONE_WELL, "--pattern", "1*")
     assert (alone.exit_code, "no stable state" in alone.stderr) == (0, True)
+
+
+def test_node_coordinates_that_stiff_bars_spoil_say_what_to_take(call: Call) -> None:
+    stiff = ("-s", "finger.linear_stiffness_N_per_mm=1e9", "-s", "finger.units=1")
+    result = call("predict", "three_unit.yaml", *stiff, *FINE)
+    assert "1 not_converged" in result.stderr
+    assert "(node coordinates with very stiff bars: take the chain)" in result.stderr
+    assert "as loads grow" not in result.stderr
+
+
+def test_a_state_that_is_lost_as_loads_grow_says_so(call: Call) -> None:
+    """Pressed from its end the finger folds onto itself; the chain has no stiff bars to mind."""
+    pressed = ("-s", "finger.units=2", "-s", "loads.tip_force_x_N=-6.5", "--pattern", "10")
+    result = call("predict", "three_unit.yaml", *pressed)
+    assert "1 not_converged" in result.stderr
+    assert "or the state is lost, or folds onto itself, as loads grow" in result.stderr
+    assert "node coordinates" not in result.stderr
 
 
 @pytest.mark.parametrize(

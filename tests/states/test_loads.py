@@ -349,6 +349,64 @@ def test_what_is_lost_as_loads_grow_is_no_state(
     assert found.status.tolist() == [Status.STABLE, Status.NOT_CONVERGED]
 
 
+def hinge_energy(corners: Array, force: float, moment: float) -> float:
+    """Of two units between rigid bars whose domes do not act: hinges only, by the tip's place."""
+    heading = -np.cumsum(corners)[0::2]  # of the chords
+    fallen = LENGTH * np.sin(heading).sum()
+    hinges = STUDY["hinge_stiffness"] * (corners**2).sum()
+    return float(hinges - force * fallen - moment * corners.sum())
+
+
+@pytest.mark.parametrize(
+    ("force", "moment"), [(2.4, 20.0), (2.4, 18.0), (2.4, 26.0), (2.2, 20.0), (2.4, 22.0)]
+)
+def test_a_unit_at_rest_that_loads_open_gets_no_dome(
+    force: float, moment: float, units_of: UnitsOf
+) -> None:
+    """Unit 1 resets, and then nothing but hinges is left: unit 2 opens past its barrier freely."""
+    finger = uniform_finger(2, **STUDY)
+    finger = replace(finger, law=PushOnly(PUBLISHED))
+    finger = loaded(finger, tip_force_y=force, end_moment=moment)
+    units, both = UnitSolutions.of(finger), units_of("10", "00")
+    settled = settle(units, chain_potential, both, 1e-12)
+    assert settled.status.tolist() == [Status.ANOTHER_PATTERN, Status.STABLE]
+    assert not settled.reached.any()
+    way = reset(finger, both[:, :1])
+    assert (way.arrived.tolist(), way.unit.tolist()) == ([True], [0])
+    assert not way.inverted.any()
+    options = {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 4000, "maxfev": 8000}
+    found = minimize(
+        hinge_energy, np.zeros(4), (force, moment), method="Nelder-Mead", options=options
+    )
+    for lane in range(2):
+        corners = settled.equilibrium.coordinates[:, lane]
+        assert corners == pytest.approx(found.x, abs=1e-5)
+    springs = settled.potential.coordinates.springs(settled.equilibrium.coordinates)
+    assert (springs.extension[1] > units.wells.spring_barrier[0]).all()
+
+
+def test_the_domes_that_a_way_ends_with_are_those_of_its_state(
+    reference_finger: Fingers, units_of: UnitsOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that has reset on a way is none though a couple opens its gap: the hinge bears it all."""
+    finger = loaded(replace(reference_finger(1), law=PushOnly(PUBLISHED)), end_moment=7.0)
+    monkeypatch.setattr(sys.modules[settle.__module__], "STRAIGHT", 0.0)  # so that all is followed
+    stable(finger, units_of("1"))
+
+    def fallen(*of: Any) -> Grown:
+        return replace(grown(*of), inverted=units_of("0"))
+
+    monkeypatch.setattr(loading, "grown", fallen)
+    settled = solved(finger, units_of("1"))
+    assert settled.status.tolist() == [Status.ANOTHER_PATTERN]
+    assert settled.reached.tolist() == [[False]]
+    springs = settled.potential.coordinates.springs(settled.equilibrium.coordinates)
+    opening = 2.0 * HEIGHT * np.sin(0.5 * 7.0 / STUDY["hinge_stiffness"])
+    assert springs.extension[0] == pytest.approx([opening], abs=1e-9)
+    rests = finger.law.rests(finger.domes)
+    assert rests.top[0, 0] < opening < rests.well[0, 0], "where an inverted dome would push"
+
+
 @pytest.mark.parametrize("formulate", [chain_potential, lattice_potential])
 @pytest.mark.parametrize("force", [-0.3, -0.8])
 def test_which_way_a_straight_finger_buckles_is_not_told(
