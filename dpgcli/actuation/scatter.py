@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from dpgcli.actuation.directions import Directions, SideBySide
+from dpgcli.actuation.graph import are_states, rests
 from dpgcli.actuation.pressed import Halt, Pressed
 from dpgcli.actuation.pulses import WHOLE, Pulse, intervals
 from dpgcli.actuation.rest import at_rest, is_certified
+from dpgcli.actuation.sequences import PulseSequence
 from dpgcli.actuation.staircase import driven, released
 from dpgcli.arrays import Array, Flags, Indices
 from dpgcli.records import dataclass
@@ -44,7 +46,7 @@ def ranges_of(pressed: Pressed, line_of: Indices, reach: float, pulses: Sequence
     size, parts = lanes_at_once(n_units), [_no_ranges()]
     for first in range(0, len(pulse), size):
         lanes = np.arange(first, min(first + size, len(pulse)))
-        lanes = lanes[_are_stable(pressed, draws.take(lanes))]
+        lanes = lanes[are_states(pressed, draws.design[lanes], draws.code[lanes])]
         if not len(lanes):
             continue
         found = intervals(pressed, line_of, np.full(n_draws, reach), draws.take(lanes))
@@ -59,13 +61,6 @@ def ranges_of(pressed: Pressed, line_of: Indices, reach: float, pulses: Sequence
 def _no_ranges() -> Ranges:
     places, free = np.zeros(0, np.int64), np.zeros(0)
     return Ranges(places, places, free, free, places)
-
-
-def _are_stable(pressed: Pressed, draws: Directions) -> Flags:
-    """Whether the states of draws are stable."""
-    inverted = inverted_units(draws.code, pressed.finger.n_units)
-    _, settled = at_rest(pressed.take_lanes(draws.design), inverted)
-    return np.asarray(settled.status == Status.STABLE)
 
 
 def window(low: Array, high: Array, n_needed: float) -> tuple[float, float]:
@@ -91,27 +86,36 @@ def window(low: Array, high: Array, n_needed: float) -> tuple[float, float]:
     return float(ends[begins[widest]]), float(highs[widest])
 
 
-def are_led(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges: Ranges) -> Flags:
+def are_led(
+    pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], ranges: Ranges, begin: Indices
+) -> Flags:
     """Which draws are in the target of each pulse after all up to it, (pulse, draw).
 
-    Those in which a pulse before the last does not lead from its source to its target are followed
-    from what it leads to: a later one may make up for it.
+    Each begins in the state with the code `begin`, (draw,): in none of them where it is −1. Those
+    that begin elsewhere than the first pulse are followed through all. Those in which a pulse
+    before the last does not lead from its source to its target are followed from what it leads to:
+    a later one may make up for it.
     """
     peak = np.abs([pulse.peak for pulse in pulses])[ranges.pulse]
     inside = ranges.take(np.flatnonzero((ranges.low <= peak) & (peak < ranges.high)))
     after = np.full((len(pulses), pressed.finger.n_designs), -1)
     after[inside.pulse, inside.draw] = inside.after
-    does = after == np.array([[pulse.target] for pulse in pulses])
-    strays = ~does[:-1]
+    is_planned = begin == pulses[0].source
+    does = (after == np.array([[pulse.target] for pulse in pulses])) & is_planned
+    elsewhere = np.flatnonzero(~is_planned & (begin >= 0))
+    if len(elsewhere):
+        own = pressed.take_lanes(elsewhere)
+        does[:, elsewhere] = followed(own, line_of, pulses, begin[elsewhere])
+    strays = ~does[:-1] & is_planned
     for place in np.flatnonzero(strays.any(axis=1)).tolist():
         draws = np.flatnonzero(strays[place] & ~strays[:place].any(axis=0))
         known = after[place, draws]
-        for which, begin in ((known < 0, place), (known >= 0, place + 1)):
+        for which, first in ((known < 0, place), (known >= 0, place + 1)):
             few = draws[which]
             if len(few):
                 code = np.where(known < 0, pulses[place].source, known)[which]
                 own = pressed.take_lanes(few)
-                does[begin:, few] = followed(own, line_of, pulses[begin:], code)
+                does[first:, few] = followed(own, line_of, pulses[first:], code)
     return np.asarray(does)
 
 
@@ -137,37 +141,69 @@ def followed(pressed: Pressed, line_of: Indices, pulses: Sequence[Pulse], start:
 
 @dataclass(frozen=True)
 class Reliability:
-    """What scatter does to a sequence of pulses.
+    """What scatter does to a sequence of pulses, if any.
 
-    `n_led` (pulse,) draws of `n_draws` are in the pattern after each pulse; `windows` (pulse, 2)
-    are the sizes of peaks, MPa, between which so many draws do it as are asked for: the second is
-    infinite where no event ends them, both are NaN where there are none.
+    Of `n_draws` draws `n_begun` begin in its first state, `n_unknown` in no certified one; `n_led`
+    (pulse,) are in the pattern after each pulse; `windows` (pulse, 2) are the sizes of peaks, MPa,
+    between which so many draws do it as are asked for: the second is infinite where no event ends
+    them, both are NaN where there are none.
     """
 
     n_draws: int
+    n_begun: int
+    n_unknown: int
     n_led: Indices
     windows: Array
+
+    @property
+    def n_done(self) -> int:
+        """How many draws are in the last state after all pulses."""
+        return int(self.n_led[-1]) if len(self.n_led) else self.n_begun
 
 
 def reliability(
     batches: Iterable[tuple[Indices, Pressed]],
     line_of: Indices,
-    reach: float,
-    pulses: Sequence[Pulse],
+    sequence: PulseSequence,
     n_draws: int,
     share: float,
+    *,
+    from_rest: bool,
 ) -> Reliability:
-    """Follow draws through pulses; those in no batch are no fingers, and do none of it."""
+    """Follow draws through the pulses of a sequence, if any, from its start.
+
+    `from_rest`: each from where it rests itself, which may be elsewhere. Those in no batch are no
+    fingers, and do none of it.
+    """
+    pulses = sequence.pulses or ()
     does = np.zeros((len(pulses), n_draws), bool)
-    parts = [_no_ranges()]
+    parts, n_begun, n_unknown = [_no_ranges()], 0, 0
     for draws, pressed in batches:
-        found = ranges_of(pressed, line_of, reach, pulses)
-        does[:, draws] = are_led(pressed, line_of, pulses, found)
-        parts.append(replace(found, draw=draws[found.draw]))
+        begin = begins(pressed, len(draws), None if from_rest else sequence.start)
+        n_begun += int((begin == sequence.start).sum())
+        n_unknown += int((begin < 0).sum())
+        if pulses:
+            found = ranges_of(pressed, line_of, sequence.reach, pulses)
+            does[:, draws] = are_led(pressed, line_of, pulses, found, begin)
+            parts.append(replace(found, draw=draws[found.draw]))
     ranges = Ranges.joined(parts)
     windows = []
     for place, pulse in enumerate(pulses):
         leads = (ranges.pulse == place) & (ranges.after == pulse.target)
         own = ranges.take(np.flatnonzero(leads))
         windows.append(window(own.low, own.high, share * n_draws))
-    return Reliability(n_draws, does.sum(axis=1), np.array(windows).reshape(-1, 2))
+    n_led = does.sum(axis=1)
+    return Reliability(n_draws, n_begun, n_unknown, n_led, np.array(windows).reshape(-1, 2))
+
+
+def begins(pressed: Pressed, n_draws: int, start: int | None) -> Indices:
+    """The codes of the states that draws begin in, (draw,); −1 where that is no certified one.
+
+    That with the code `start`, or of none where each rests under its own loads.
+    """
+    if start is None:
+        code, is_certain = rests(pressed, n_draws)
+    else:
+        code = np.full(n_draws, start, np.uint64)
+        is_certain = are_states(pressed, np.arange(n_draws), code)
+    return np.where(is_certain, code.astype(np.int64), -1)

@@ -1,6 +1,7 @@
 """What scatter does to transitions: thresholds of many draws of a finger, a lane each."""
 
 from collections.abc import Iterable
+from enum import IntEnum
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from dpgcli.actuation.staircase import MOST_EVENTS, UNKNOWN, Events, Journey, re
 from dpgcli.actuation.transitions import Transitions
 from dpgcli.arrays import Array, Codes, Columns, Flags, Indices
 from dpgcli.design.outputs import Output
-from dpgcli.states.certify import Status
+from dpgcli.states.certify import UNDECIDED, Status
 from dpgcli.states.columns import Column
 from dpgcli.states.patterns import codes_of, inverted_units
 from dpgcli.states.settle import lanes_at_once
@@ -19,14 +20,35 @@ from dpgcli.states.settle import lanes_at_once
 TAIL = 2.5  # % of draws on each side
 PRESSURES = (Output.PRESSURES,)
 SPREAD_COLUMNS = (
-    Column("share_leaving", "", "share of draws that leave the state at some pressure"),
-    Column("share_unknown", "", "share of which no equilibrium is found: they may leave as well"),
-    Column("share_same_unit", "", "share in which the same unit leaves, or one tied with it"),
+    Column("share_leaving", "", "share of all draws that leave the state at some pressure"),
+    Column(
+        "share_without_state",
+        "",
+        "share of all draws without a certified state of the pattern, or that are no fingers",
+    ),
+    Column(
+        "share_unknown",
+        "",
+        "share of all draws of which no equilibrium is found, or not whether they have the state: "
+        "they may leave as well",
+    ),
+    Column(
+        "share_same_unit", "", "share of all draws in which the same unit leaves, or one of its tie"
+    ),
     Column("pressure_mean_MPa", "MPa", "mean of the thresholds of draws", outputs=PRESSURES),
     Column("pressure_deviation_MPa", "MPa", "their standard deviation", outputs=PRESSURES),
     Column("pressure_low_MPa", "MPa", "2.5 % of them are below", outputs=PRESSURES),
     Column("pressure_high_MPa", "MPa", "2.5 % of them are above", outputs=PRESSURES),
 )
+
+
+class Fate(IntEnum):
+    """What becomes of a draw in a direction."""
+
+    STAYS = 0  # or folds onto itself before it leaves
+    LEAVES = 1
+    STATELESS = 2
+    UNKNOWN = 3
 
 
 def spread_rows(
@@ -36,19 +58,20 @@ def spread_rows(
     rows: Transitions,
     n_draws: int,
 ) -> Columns:
-    """How the thresholds of transitions scatter, by column; draws in no batch leave nothing."""
+    """How the thresholds of transitions scatter, by column; draws in no batch have no states."""
     pressure = np.full((len(rows.code), n_draws), np.nan)
     unit = np.full((len(rows.code), n_draws), -1)
-    is_unknown = np.zeros(unit.shape, bool)
+    fate = np.full(unit.shape, Fate.STATELESS)
     for draws, pressed in batches:
         found = _first_flips(pressed, line_of, reach, rows)
-        pressure[:, draws], unit[:, draws], is_unknown[:, draws] = found
-    leaves = ~np.isnan(pressure)
+        pressure[:, draws], unit[:, draws], fate[:, draws] = found
+    leaves = fate == Fate.LEAVES
     alike = inverted_units(rows.tied, len(line_of))  # (unit, row)
     alike[np.maximum(rows.unit, 0), np.arange(len(rows.unit))] |= rows.unit >= 0
     is_same = (unit >= 0) & alike[unit, np.arange(len(unit))[:, None]]
     columns = np.array([_statistics(own[has]) for own, has in zip(pressure, leaves, strict=True)])
-    shares = np.stack([share.mean(axis=1) for share in (leaves, is_unknown, is_same)], axis=1)
+    each = leaves, fate == Fate.STATELESS, fate == Fate.UNKNOWN, is_same
+    shares = np.stack([share.mean(axis=1) for share in each], axis=1)
     table = np.concatenate([shares, columns.reshape(len(shares), 4)], axis=1)
     return dict(zip((column.name for column in SPREAD_COLUMNS), table.T, strict=True))
 
@@ -64,11 +87,10 @@ def _statistics(pressures: Array) -> tuple[float, float, float, float]:
 
 def _first_flips(
     pressed: Pressed, line_of: Indices, reach: float, rows: Transitions
-) -> tuple[Array, Indices, Flags]:
-    """Pressures at which draws first flip in the directions of rows, and by which unit.
+) -> tuple[Array, Indices, Indices]:
+    """Pressures at which draws first flip in the directions of rows, by which unit, and their fate.
 
-    Both (row, draw); NaN and −1 where they do not, or the state is none. And where no equilibrium
-    is found, so that nobody knows.
+    All (row, draw); NaN and −1 where they do not flip, or the state is none.
     """
     n_units, n_draws = pressed.finger.n_units, pressed.finger.n_designs
     n = len(rows.code) * n_draws
@@ -78,19 +100,19 @@ def _first_flips(
         rows.line.repeat(n_draws),
         rows.sign.repeat(n_draws),
     )
-    pressure, unit, is_unknown = np.full(n, np.nan), np.full(n, -1), np.zeros(n, bool)
+    pressure, unit, fate = np.full(n, np.nan), np.full(n, -1), np.full(n, Fate.STATELESS)
     size = lanes_at_once(n_units)
     for first in range(0, n, size):
         lanes = np.arange(first, min(first + size, n))
         few = directions.take(lanes)
-        pressure[lanes], unit[lanes], is_unknown[lanes] = _flips(pressed, line_of, reach, few)
+        pressure[lanes], unit[lanes], fate[lanes] = _flips(pressed, line_of, reach, few)
     shape = len(rows.code), n_draws
-    return pressure.reshape(shape), unit.reshape(shape), is_unknown.reshape(shape)
+    return pressure.reshape(shape), unit.reshape(shape), fate.reshape(shape)
 
 
 def _flips(
     pressed: Pressed, line_of: Indices, reach: float, directions: Directions
-) -> tuple[Array, Indices, Flags]:
+) -> tuple[Array, Indices, Indices]:
     """The same of some directions, (lane,)."""
     pressure, unit = np.full(len(directions), np.nan), np.full(len(directions), -1)
     own = pressed.take_lanes(directions.design)
@@ -110,9 +132,10 @@ def _flips(
         pressure[states[which]] = on_line(halted.shapes, line_of, line[which])
         unit[states[which]] = halted.unit
         journey.go_on(~is_flip[events.is_fine])
-    is_unknown = np.zeros(len(directions), bool)
-    is_unknown[states] = np.isin(journey.reason, UNKNOWN) & np.isnan(pressure[states])
-    return pressure, unit, is_unknown
+    fate = np.where(np.isin(settled.status, UNDECIDED), Fate.UNKNOWN, Fate.STATELESS)
+    fate[states] = np.where(np.isin(journey.reason, UNKNOWN), Fate.UNKNOWN, Fate.STAYS)
+    fate[~np.isnan(pressure)] = Fate.LEAVES
+    return pressure, unit, fate
 
 
 def _leaves(pressed: Pressed, events: Events, code: Codes) -> Flags:

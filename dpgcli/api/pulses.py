@@ -67,20 +67,24 @@ SCATTER_COLUMNS = (
 
 @dataclass(frozen=True)
 class ScatteredPulses:
-    """What scatter does to a sequence: the draws, and how reliably it leads each to its state."""
+    """What scatter does to a sequence: the draws, and how reliably it leads each to its state.
+
+    `from_rest`: each from where it rests itself, as no start is given.
+    """
 
     draws: Draws
     found: Reliability
+    from_rest: bool
 
     @property
     def probability(self) -> float:
-        """The share of draws that end in the state."""
-        return float(self.found.n_led[-1]) / self.found.n_draws
+        """The share of draws that end in the state; where no pulse is needed, that are in it."""
+        return self.found.n_done / self.found.n_draws
 
     @property
     def interval(self) -> tuple[float, float]:
         """Its 95 % confidence interval."""
-        return share_interval(int(self.found.n_led[-1]), self.found.n_draws)
+        return share_interval(self.found.n_done, self.found.n_draws)
 
 
 @dataclass(frozen=True)
@@ -172,12 +176,24 @@ class PulsesResult(TableResult):
 
     def _scatter_lines(self, scattered: ScatteredPulses) -> Iterator[str]:
         yield from scattered.draws.lines
+        found, pulses = scattered.found, self.sequence.pulses
+        begin = "rest" if scattered.from_rest else "begin"
+        if pulses and found.n_begun < found.n_draws:
+            yield f"{counted(found.n_begun, 'draw')} of {found.n_draws:,} {begin} in {self.start}"
+        if n := found.n_unknown:
+            none = "no certified state"
+            why = (
+                f"unknown: at rest in {none}; counted as failures"
+                if scattered.from_rest
+                else f"with {none} {self.start}: counted as failures"
+            )
+            yield f"{counted(n, 'draw')} {why}"
         low, high = scattered.interval
         yield (
-            f"{scattered.probability:.1%} of draws end in {self.end} "
+            f"{scattered.probability:.1%} of draws {'end' if pulses else begin} in {self.end} "
             f"({CONFIDENCE:.0%} confidence: {low:.1%} to {high:.1%})"
         )
-        empty = np.isnan(scattered.found.windows[:, 0])
+        empty = np.isnan(found.windows[:, 0])
         if narrow := [str(k) for k, is_empty in enumerate(empty, 1) if is_empty]:
             yield f"{_numbers(narrow)}: no peak leads {SHARE:.0%} of draws on"
 
@@ -186,7 +202,7 @@ def _scatter_rows(scattered: ScatteredPulses, pulses: Iterable[Pulse]) -> Column
     """What scatter does to each pulse, by column."""
     found = scattered.found
     ends = np.array([share_interval(int(n), found.n_draws) for n in found.n_led]).reshape(-1, 2)
-    windows = found.windows * np.array([[np.sign(pulse.peak)] for pulse in pulses])
+    windows = found.windows * np.array([np.sign(pulse.peak) for pulse in pulses])[:, None]
     return {
         "probability": found.n_led / found.n_draws,
         "probability_low": ends[:, 0],
@@ -224,7 +240,8 @@ def pulses(
     `end` and `start` are patterns such as "10110"; without a start that in which the finger rests.
     Each pulse raises or lowers one line and lets it go. The sequence is replayed by path following.
     `scatter`, such as "dome_thickness_mm=2%,dome_height_mm=0.1mm", are standard deviations of
-    values around those of the spec: so many `draws` of fingers, 1000 unless given, are followed.
+    values around those of the spec: so many `draws` of fingers, 1000 unless given, are followed,
+    without a start each from where it rests itself.
     Raises SpecError for a wrong spec or scatter, UsageError for patterns that are no stable states
     and other wrong choices, ActuationError where the replay ends elsewhere.
 
@@ -258,18 +275,15 @@ def pulses_of(
     if found.pulses is None:
         reasons = [*hindrances(pressed, lines.lines, lines.line_of, found)]
         graded = graded_for(given, found)
-        return PulsesResult(given, *names, found, (*reasons, *graded.text), graded)
+        said = () if draws is None else ("scatter: without pulses no draws are followed",)
+        return PulsesResult(given, *names, found, (*reasons, *graded.text, *said), graded)
     if found.replay is not None and found.replay.problem:
         raise ActuationError(found, f"the sequence found does not hold: {found.replay.problem}")
-    scattered = _scattered(given, found, draws) if draws is not None and found.pulses else None
-    return PulsesResult(given, *names, found, scattered=scattered)
-
-
-def _scattered(given: PressedInput, found: PulseSequence, draws: Draws) -> ScatteredPulses:
-    """What scatter does to a sequence of at least one pulse."""
-    pulses, line_of = found.pulses or (), given.pressure.line_of
-    led = reliability(draws.batches(), line_of, found.reach, pulses, draws.n_draws, SHARE)
-    return ScatteredPulses(draws, led)
+    if draws is None:
+        return PulsesResult(given, *names, found)
+    from_rest, batches = not start, draws.batches()
+    led = reliability(batches, lines.line_of, found, draws.n_draws, SHARE, from_rest=from_rest)
+    return PulsesResult(given, *names, found, scattered=ScatteredPulses(draws, led, from_rest))
 
 
 def check_size(given: PressedInput) -> None:

@@ -53,6 +53,7 @@ class Status(IntEnum):
         return f"{self.meaning}; or {_LOST}" if is_by_way else self.meaning
 
 
+UNDECIDED = (Status.MARGINAL, Status.NOT_CONVERGED)  # a saddle has states beside it
 _MEANINGS = {
     Status.STABLE: "certified: residual, curvature, wells and shape",
     Status.MARGINAL: "an equilibrium whose curvature is not safely positive: next to a fold, or a "

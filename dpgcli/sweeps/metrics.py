@@ -15,7 +15,7 @@ from dpgcli.arrays import Array, Columns, Flags, Indices
 from dpgcli.design.outputs import STIFFNESS, Output
 from dpgcli.design.pressure import Pressure
 from dpgcli.records import dataclass
-from dpgcli.states.certify import Status
+from dpgcli.states.certify import UNDECIDED, Status
 from dpgcli.states.columns import Column, Group, Kind
 from dpgcli.states.units import UnitSolutions
 from dpgcli.states.wells import barriers
@@ -158,7 +158,6 @@ class Metrics:
 
 
 SHAPES = (Output.SHAPES,)
-UNDECIDED = (Status.MARGINAL, Status.NOT_CONVERGED)  # a saddle has states beside it
 UNKNOWN_STATES, UNKNOWN_GRASPS = "n_unknown_states", "n_unknown_grasps"
 UNKNOWN_DIRECTIONS = "n_unknown_directions"
 

@@ -9,7 +9,7 @@ from dpgcli.actuation import scatter
 from dpgcli.actuation.pressed import Pressed
 from dpgcli.actuation.pulses import Pulse
 from dpgcli.actuation.scatter import are_led, followed, ranges_of, reliability, window
-from dpgcli.actuation.sequences import pulse_sequence
+from dpgcli.actuation.sequences import PulseSequence, pulse_sequence
 from dpgcli.arrays import Array
 from dpgcli.mechanics.finger import Finger
 
@@ -33,21 +33,19 @@ def draws(study: Study, pressed: Made) -> Pressed:
 
 
 @pytest.fixture
-def plan(study: Study, pressed: Made) -> tuple[tuple[Pulse, ...], float]:
+def plan(study: Study, pressed: Made) -> PulseSequence:
     """Up to 111 and down to 001."""
     found = pulse_sequence(pressed(study(3).changed(stroke=STROKES)), LINE, 0, 0b001)
     assert found.pulses is not None
     assert len(found.pulses) == 2
-    return found.pulses, found.reach
+    return found
 
 
-def test_draws_in_a_batch_do_what_each_does_by_itself(
-    draws: Pressed, plan: tuple[tuple[Pulse, ...], float]
-) -> None:
+def test_draws_in_a_batch_do_what_each_does_by_itself(draws: Pressed, plan: PulseSequence) -> None:
     """By ranges of peaks, and followed through the pulses: all together, and one by one."""
-    pulses, reach = plan
-    together = followed(draws, LINE, pulses, np.zeros(N, np.int64))
-    by_ranges = are_led(draws, LINE, pulses, ranges_of(draws, LINE, reach, pulses))
+    pulses, reach, zeros = plan.pulses or (), plan.reach, np.zeros(N, np.int64)
+    together = followed(draws, LINE, pulses, zeros)
+    by_ranges = are_led(draws, LINE, pulses, ranges_of(draws, LINE, reach, pulses), zeros)
     some = [0, *np.flatnonzero(together[0] != together[1])[:4], N - 2, N - 1]
     zero = np.zeros(1, np.int64)
     alone = [followed(draws.take_lanes(np.array([k])), LINE, pulses, zero)[:, 0] for k in some]
@@ -57,13 +55,11 @@ def test_draws_in_a_batch_do_what_each_does_by_itself(
     assert 0 < together[1].sum() < N - 1
 
 
-def test_a_window_is_where_so_many_draws_do_it(
-    draws: Pressed, plan: tuple[tuple[Pulse, ...], float]
-) -> None:
+def test_a_window_is_where_so_many_draws_do_it(draws: Pressed, plan: PulseSequence) -> None:
     """Peaks at both ends of the window, and just outside it, counted by following all draws."""
-    (first, second), reach = plan
+    first, second = plan.pulses or ()
     every = [(np.arange(N), draws)]
-    found = reliability(every, LINE, reach, (first, second), N, 0.6)
+    found = reliability(every, LINE, plan, N, 0.6, from_rest=False)
     low, high = found.windows[0]
     assert np.isinf(high)
     assert low > 0.0
@@ -83,9 +79,9 @@ def test_a_window_is_where_so_many_draws_do_it(
 
 
 def test_chunks_change_no_bit(
-    draws: Pressed, plan: tuple[tuple[Pulse, ...], float], monkeypatch: pytest.MonkeyPatch
+    draws: Pressed, plan: PulseSequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pulses, reach = plan
+    pulses, reach = plan.pulses or (), plan.reach
     whole = ranges_of(draws, LINE, reach, pulses)
     monkeypatch.setattr(scatter, "lanes_at_once", lambda n_units: 7)
     parts = ranges_of(draws, LINE, reach, pulses)
@@ -93,16 +89,15 @@ def test_chunks_change_no_bit(
         assert np.array_equal(getattr(whole, name), getattr(parts, name))
 
 
-def test_draws_in_no_batch_are_failures(
-    study: Study, pressed: Made, plan: tuple[tuple[Pulse, ...], float]
-) -> None:
+def test_draws_in_no_batch_are_failures(study: Study, pressed: Made, plan: PulseSequence) -> None:
     own = pressed(study(3).changed(stroke=np.repeat(STROKES, 3, axis=1)))
-    pulses, reach = plan
-    found = reliability([(np.array([0, 2, 5]), own)], LINE, reach, pulses, 6, 0.5)
+    some = [(np.array([0, 2, 5]), own)]
+    found = reliability(some, LINE, plan, 6, 0.5, from_rest=True)
     assert found.n_led.tolist() == [3, 3]
+    assert (found.n_begun, found.n_unknown) == (3, 0)
     assert not np.isnan(found.windows).any()
-    assert np.isnan(reliability([], LINE, reach, pulses, 6, 0.5).windows).all()
-    most = reliability([(np.array([0, 2, 5]), own)], LINE, reach, pulses, 6, 0.51)
+    assert np.isnan(reliability([], LINE, plan, 6, 0.5, from_rest=True).windows).all()
+    most = reliability(some, LINE, plan, 6, 0.51, from_rest=True)
     assert np.isnan(most.windows).all()
 
 

@@ -36,6 +36,8 @@ def test_statistics_are_those_of_the_units_that_leave_first(
     places = np.arange(N) + 3
     found = spread_rows([(places, draws)], LINES, graph.reach, rows, n_draws)
     assert [*found] == [column.name for column in SPREAD_COLUMNS]
+    assert (found["share_without_state"] == 10 / n_draws).all()
+    assert (found["share_unknown"] == 0.0).all()
     alone = thresholds_alone(draws)
     for k in range(len(rows.code)):
         state = np.array([digit == "1" for digit in f"{int(rows.code[k]):03b}"])

@@ -230,7 +230,7 @@ def test_scatter_adds_the_spread_of_thresholds() -> None:
     table = found.table
     assert list(table.names) == [
         *plain.names,
-        *("share_leaving", "share_unknown", "share_same_unit"),
+        *("share_leaving", "share_without_state", "share_unknown", "share_same_unit"),
         *("pressure_mean_MPa", "pressure_deviation_MPa", "pressure_low_MPa", "pressure_high_MPa"),
     ]
     leaves = ~np.isnan(plain["pressure_MPa"])
