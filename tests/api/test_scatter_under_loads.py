@@ -50,7 +50,7 @@ def stiffnesses(couple: float) -> np.ndarray[tuple[int, int], np.dtype[np.float6
 
 def followed(couple: float, table: Any) -> tuple[list[str], list[str]]:
     """Where each draw rests before the pulses of a table, and where after: one by one."""
-    peaks: dict[str, list[float]] = {"A": [0.0], "B": [0.0]}
+    peaks: dict[str, list[float]] = {"A": [0.0, 0.0], "B": [0.0, 0.0]}
     for line, peak in zip(table["line"], table["peak_pressure_MPa"], strict=True):
         for name, history in peaks.items():
             history += [float(peak) if name == str(line) else 0.0, 0.0]
@@ -82,6 +82,7 @@ def test_the_spread_of_draws_is_the_one_asked_for() -> None:
     np.testing.assert_allclose(ratios.std(axis=1), DEVIATION, rtol=0.3)
 
 
+@pytest.mark.slow
 def test_without_pulses_draws_rest_where_they_do() -> None:
     found = dpg.pulses(loaded(-50.9), end="10", scatter=f"{KEY}=3%", draws=N)
     assert found.exists
@@ -113,12 +114,12 @@ def test_a_given_start_is_that_of_all_draws_that_have_it() -> None:
 
 
 def test_draws_of_unknown_rest_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if one draw rested in no certified state."""
+    """As if one of those that rest in 10 rested in no certified state."""
     rests, scatter = module.rests, {"scatter": f"{KEY}=3%", "draws": N}
 
     def doubtful(pressed: Pressed, n_designs: int) -> tuple[Codes, Flags]:
         codes, _ = rests(pressed, n_designs)
-        return codes, np.arange(n_designs) > 0
+        return codes, np.arange(n_designs) != np.argmax(codes == 0b10)
 
     whole = dpg.pulses(loaded(-50.9), end="10", **scatter)
     monkeypatch.setattr(module, "rests", doubtful)
@@ -126,11 +127,6 @@ def test_draws_of_unknown_rest_are_counted(monkeypatch: pytest.MonkeyPatch) -> N
     assert "1 draw unknown: at rest in no certified state; counted as failures" in found.summary
     assert whole.scattered is not None
     assert found.scattered is not None
-    first = dpg.actuate(
-        loaded(-50.9, *stiffnesses(-50.9)[:, 0].tolist()),
-        pressure={"A": [0.0, 0.0], "B": [0.0, 0.0]},
-    )
-    assert first.start == "10"
     assert found.scattered.found.n_done == whole.scattered.found.n_done - 1
 
 
