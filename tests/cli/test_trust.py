@@ -487,7 +487,8 @@ def test_values_without_a_spec_rest_on_nothing_that_is_known() -> None:
 def test_metadata_that_say_nothing(domes: Path, text: str) -> None:
     assert trusts_in({"dpg.trust": text}) == {}
     assert warnings_in({"dpg.warnings": text}) == []
-    table = pa.table({"design": [0], "calibration": [""], "status": ["stable"]})
+    facts = {"design": [0], "calibration": [""], "status": ["stable"], "n_unknown_states": [0]}
+    table = pa.table(facts)
     rest = table.append_column("reason", pa.array([""])).append_column("n_stable", pa.array([4]))
     said = rest.replace_schema_metadata({"dpg.trust": text})
     (verdict,) = dpg.check(said, "n_stable > 0")
