@@ -173,7 +173,7 @@ def test_a_damaged_description_is_not_believed(study: Any) -> None:
     path.write_bytes(content.replace(b'"76"', b'"75"'))
     with pytest.raises(UsageError, match=r"sweep\.json is damaged: run its sweep again"):
         assemble([made.store], made.folder)
-    with pytest.raises(UsageError, match=r"an unfinished sweep whose sweep\.json is damaged"):
+    with pytest.raises(UsageError, match=r"unfinished work whose sweep\.json is damaged"):
         study(AXES[0]).check_unfinished()
     path.write_bytes(b"[" * 100_000)
     assert made.store.said() == {}
